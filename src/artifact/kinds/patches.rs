@@ -1,0 +1,90 @@
+//! Kind `patches`: the finished surface, self-contained.
+
+use crate::artifact;
+use isospline_geometry::Vec3;
+use isospline_geometry::bezier_curve::raise_quartic_to_septic;
+use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index, interior_indices};
+
+/// How the patches were built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheme {
+    /// G1 triangular spline of Tong and Kim.
+    TongKim,
+}
+
+impl Scheme {
+    /// The stored code.
+    pub fn code(self) -> u32 {
+        match self {
+            Self::TongKim => 0,
+        }
+    }
+}
+
+/// One row: what the control points mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct PatchMeta {
+    /// Code of the [`Scheme`].
+    pub scheme: u32,
+    /// Degree of the patches.
+    pub degree: u32,
+    /// Degree of the boundary curves as stored.
+    pub boundary_degree: u32,
+    /// 1 if weights are stored.
+    pub rational: u32,
+}
+
+artifact! {
+    /// Degree-7 triangular Bézier patches with quartic boundary curves (fairing).
+    pub struct Patches / PatchesView = "patches", schema 1 {
+        /// What the control points mean.
+        meta: PatchMeta, One;
+        /// Vertex positions.
+        position: [f64; 3], Vertices;
+        /// Corners of each face, counter-clockwise seen from outside.
+        face: [u32; 3], Faces;
+        /// Edge of each half-edge.
+        edge_of: u32, HalfEdges;
+        /// Control points q1, q2, q3 of each edge, from the lower to the higher vertex.
+        boundary: [f64; 9], Edges;
+        /// The 15 interior control points in storage order.
+        interior: [f64; 45], Faces;
+    }
+}
+
+impl PatchesView<'_> {
+    /// The full net of `face`, in storage order.
+    ///
+    /// An edge's curve is raised from its lower vertex and copied, so the nets of neighbouring
+    /// faces carry the same bits along their shared edge.
+    pub fn net(&self, face: usize) -> [Vec3; N_CONTROL] {
+        let mut net = [Vec3::zeros(); N_CONTROL];
+        for corner in 0..3 {
+            let curve = self.raised_edge(face, corner);
+            for (s, point) in curve.into_iter().enumerate() {
+                net[boundary_index(DEGREE, corner, s)] = point;
+            }
+        }
+        let inner = self.interior[face].chunks_exact(3);
+        for (slot, p) in interior_indices().into_iter().zip(inner) {
+            net[slot] = Vec3::new(p[0], p[1], p[2]);
+        }
+        net
+    }
+
+    /// The raised curve of the edge from `corner` to the next one.
+    fn raised_edge(&self, face: usize, corner: usize) -> [Vec3; DEGREE + 1] {
+        let from = self.face[face][corner] as usize;
+        let to = self.face[face][(corner + 1) % 3] as usize;
+        let inner = &self.boundary[self.edge_of[3 * face + corner] as usize];
+        let at = |k: usize| Vec3::new(inner[3 * k], inner[3 * k + 1], inner[3 * k + 2]);
+        let end = |v: usize| Vec3::from(self.position[v]);
+        let (low, high) = (from.min(to), from.max(to));
+        let mut curve = raise_quartic_to_septic(&[end(low), at(0), at(1), at(2), end(high)]);
+        if from > to {
+            curve.reverse();
+        }
+        curve
+    }
+}

@@ -1,0 +1,1 @@
+//! The outside checker: continuity, distance, watertightness and topology of finished patches

@@ -1,0 +1,1 @@
+//! What several stages share of the method: projection, shape operator, edge weights

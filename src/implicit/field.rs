@@ -1,0 +1,158 @@
+//! What a scalar field answers.
+
+use crate::{Interval, IntervalJet};
+use isospline_geometry::{Mat3, Vec3};
+
+/// Symmetric 3 by 3 matrix as `[xx, xy, xz, yy, yz, zz]`.
+pub type SymMat3 = [f64; 6];
+
+/// The full matrix of a [`SymMat3`].
+pub fn full(s: &SymMat3) -> Mat3 {
+    Mat3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5])
+}
+
+/// Value and gradient at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jet1 {
+    /// `f(p)`.
+    pub value: f64,
+    /// `grad f(p)`.
+    pub gradient: Vec3,
+}
+
+/// Value, gradient and Hessian at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jet2 {
+    /// `f(p)`.
+    pub value: f64,
+    /// `grad f(p)`.
+    pub gradient: Vec3,
+    /// Second derivatives.
+    pub hessian: SymMat3,
+}
+
+/// A scalar field `f: R^3 -> R`; its zero set is the surface and `f < 0` inside.
+///
+/// Points are evaluated in bulk; `points` and `out` have equal lengths. NaN and infinite values
+/// are data: callers test for them. Results depend on the point alone, not on its neighbours in
+/// the call nor on the thread.
+pub trait Field: Send + Sync {
+    /// Values.
+    fn values(&self, points: &[Vec3], out: &mut [f64]);
+
+    /// Values and gradients.
+    fn gradients(&self, points: &[Vec3], out: &mut [Jet1]);
+
+    /// Values, gradients and Hessians.
+    fn hessians(&self, points: &[Vec3], out: &mut [Jet2]);
+
+    /// Enclosure of the value over a box given by an interval an axis; `None` if the field has
+    /// no interval arithmetic (a user's closure).
+    fn value_enclosure(&self, domain: [Interval; 3]) -> Option<Interval>;
+
+    /// Enclosures of value and gradient over a box.
+    fn gradient_enclosure(&self, domain: [Interval; 3]) -> Option<IntervalJet>;
+
+    /// Value at one point.
+    fn value(&self, point: Vec3) -> f64 {
+        let mut out = [0.0];
+        self.values(&[point], &mut out);
+        out[0]
+    }
+
+    /// Value and gradient at one point.
+    fn gradient(&self, point: Vec3) -> Jet1 {
+        let mut out = [Jet1 { value: 0.0, gradient: Vec3::zeros() }];
+        self.gradients(&[point], &mut out);
+        out[0]
+    }
+
+    /// Value, gradient and Hessian at one point.
+    fn hessian(&self, point: Vec3) -> Jet2 {
+        let mut out = [Jet2 { value: 0.0, gradient: Vec3::zeros(), hessian: [0.0; 6] }];
+        self.hessians(&[point], &mut out);
+        out[0]
+    }
+}
+
+/// `sign * (inner - level)`: moves a level set to zero and turns it so that `f < 0` inside.
+#[derive(Clone, Copy, Debug)]
+pub struct Oriented<F> {
+    /// The field as the user wrote it.
+    pub inner: F,
+    /// The level whose set is the surface.
+    pub level: f64,
+    /// Whether the sign is turned.
+    pub flipped: bool,
+}
+
+impl<F> Oriented<F> {
+    fn sign(&self) -> f64 {
+        if self.flipped { -1.0 } else { 1.0 }
+    }
+}
+
+impl<F: Field> Field for Oriented<F> {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        self.inner.values(points, out);
+        let sign = self.sign();
+        for f in out {
+            *f = sign * (*f - self.level);
+        }
+    }
+
+    fn gradients(&self, points: &[Vec3], out: &mut [Jet1]) {
+        self.inner.gradients(points, out);
+        let sign = self.sign();
+        for jet in out {
+            *jet = Jet1 { value: sign * (jet.value - self.level), gradient: sign * jet.gradient };
+        }
+    }
+
+    fn hessians(&self, points: &[Vec3], out: &mut [Jet2]) {
+        self.inner.hessians(points, out);
+        let sign = self.sign();
+        for jet in out {
+            *jet = Jet2 {
+                value: sign * (jet.value - self.level),
+                gradient: sign * jet.gradient,
+                hessian: jet.hessian.map(|h| sign * h),
+            };
+        }
+    }
+
+    fn value_enclosure(&self, domain: [Interval; 3]) -> Option<Interval> {
+        self.inner.value_enclosure(domain).map(|f| self.turn(f.minus(self.level)))
+    }
+
+    fn gradient_enclosure(&self, domain: [Interval; 3]) -> Option<IntervalJet> {
+        self.inner.gradient_enclosure(domain).map(|jet| IntervalJet {
+            value: self.turn(jet.value.minus(self.level)),
+            gradient: jet.gradient.map(|g| self.turn(g)),
+        })
+    }
+}
+
+impl<F> Oriented<F> {
+    fn turn(&self, i: Interval) -> Interval {
+        if self.flipped { Interval { lo: -i.hi, hi: -i.lo } } else { i }
+    }
+}
+
+impl<F: Field + ?Sized> Field for &F {
+    fn values(&self, points: &[Vec3], out: &mut [f64]) {
+        (**self).values(points, out);
+    }
+    fn gradients(&self, points: &[Vec3], out: &mut [Jet1]) {
+        (**self).gradients(points, out);
+    }
+    fn hessians(&self, points: &[Vec3], out: &mut [Jet2]) {
+        (**self).hessians(points, out);
+    }
+    fn value_enclosure(&self, domain: [Interval; 3]) -> Option<Interval> {
+        (**self).value_enclosure(domain)
+    }
+    fn gradient_enclosure(&self, domain: [Interval; 3]) -> Option<IntervalJet> {
+        (**self).gradient_enclosure(domain)
+    }
+}

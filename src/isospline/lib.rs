@@ -1,0 +1,1 @@
+//! Implicit surfaces to watertight G1 triangular spline surfaces: library and command line

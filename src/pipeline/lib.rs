@@ -1,0 +1,1 @@
+//! Graph, keys and staleness, driver, threads, channels and progress events

@@ -1,0 +1,13 @@
+//! The Stage trait: a pure function of inputs, parameters and field, cut into tasks.
+
+pub mod counters;
+pub mod host;
+pub mod inputs;
+pub mod plan;
+pub mod stage;
+
+pub use counters::Counters;
+pub use host::{Host, Serial, Stopped, map};
+pub use inputs::{InputSource, Inputs};
+pub use plan::{Plan, Task};
+pub use stage::{Ctx, Diagnosis, Params, Piece, Stage};

@@ -1,0 +1,1 @@
+//! Stage g0_fit
