@@ -66,6 +66,17 @@ pub const fn first_inner_index(n: usize, corner: usize, s: usize) -> usize {
     index(edge_frame(n, corner, s, 1))
 }
 
+/// Place among the interior points of step `s` (1..=5) of the first row inside an edge of a
+/// degree-7 net: the interior of a degree-7 net is ordered like a net of degree 4.
+#[inline]
+pub const fn first_inner_slot(corner: usize, s: usize) -> usize {
+    let [i, j, k] = edge_frame(DEGREE, corner, s, 1);
+    index([i - 1, j - 1, k - 1])
+}
+
+/// Place among the interior points of the three points that lie on no first inner row.
+pub const INNERMOST_SLOTS: [usize; 3] = [index([2, 1, 1]), index([1, 2, 1]), index([1, 1, 2])];
+
 /// Values at (u, v, w) of the Bernstein polynomials of degree `n`, in storage order.
 pub fn bernstein(n: usize, [u, v, w]: [f64; 3]) -> Vec<f64> {
     exponents(n)
@@ -108,6 +119,19 @@ mod tests {
         assert_eq!(first_inner_index(7, 0, 1), index([5, 1, 1]));
         assert_eq!(first_inner_index(7, 1, 1), index([1, 5, 1]));
         assert_eq!(first_inner_index(7, 2, 5), index([5, 1, 1]));
+    }
+
+    #[test]
+    fn interior_slots_agree_with_the_full_net() {
+        let interior = interior_indices();
+        for corner in 0..3 {
+            for s in 1..=5 {
+                let slot = first_inner_slot(corner, s);
+                assert_eq!(interior[slot], first_inner_index(7, corner, s));
+            }
+        }
+        let innermost = INNERMOST_SLOTS.map(|slot| interior[slot]);
+        assert_eq!(innermost, [index([3, 2, 2]), index([2, 3, 2]), index([2, 2, 3])]);
     }
 
     #[test]

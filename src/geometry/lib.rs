@@ -5,11 +5,13 @@
 pub mod aabb;
 pub mod bezier_curve;
 pub mod bezier_triangle;
+pub mod edit_mesh;
 pub mod half_edge;
 pub mod linear;
 pub mod triangle_mesh;
 
 pub use aabb::Aabb;
+pub use edit_mesh::EditMesh;
 pub use half_edge::HalfEdge;
 pub use triangle_mesh::TriangleMesh;
 

@@ -74,38 +74,49 @@ impl TriangleMesh {
     /// The first [`Defect`] in face order that keeps the faces from being oriented and manifold
     /// along their edges.
     pub fn opposites(&self) -> Result<Vec<u32>, Defect> {
-        let mut directed = self.directed_edges()?;
-        directed.sort_unstable();
-        for pair in directed.windows(2) {
-            if (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1) {
-                let (from, to, half) = pair[1];
-                return Err(Defect::DoubledHalfEdge { face: half / 3, from, to });
-            }
-        }
+        let (first, leaving) = self.leaving_half_edges()?;
+        let leaving_from = |v: u32| {
+            let v = v as usize;
+            leaving[first[v] as usize..first[v + 1] as usize].iter().map(|&h| HalfEdge(h))
+        };
         let mut opposite = vec![BORDER; 3 * self.faces.len()];
-        for &(from, to, half) in &directed {
-            if let Ok(k) = directed.binary_search_by_key(&(to, from), |&(a, b, _)| (a, b)) {
-                opposite[half as usize] = directed[k].2;
+        for h in (0..3 * self.faces.len() as u32).map(HalfEdge) {
+            let (from, to) = (self.origin(h), self.origin(h.next()));
+            // Rows of a vertex ascend, so the second face along a directed edge finds the first.
+            if leaving_from(from).take_while(|o| o.0 < h.0).any(|o| self.origin(o.next()) == to) {
+                return Err(Defect::DoubledHalfEdge { face: h.face(), from, to });
+            }
+            if let Some(o) = leaving_from(to).find(|o| self.origin(o.next()) == from) {
+                opposite[h.row()] = o.0;
             }
         }
         Ok(opposite)
     }
 
-    fn directed_edges(&self) -> Result<Vec<(u32, u32, u32)>, Defect> {
-        let mut directed = Vec::with_capacity(3 * self.faces.len());
+    /// Half-edges sorted by their origin: first row of each vertex (and the end), and the rows.
+    fn leaving_half_edges(&self) -> Result<(Vec<u32>, Vec<u32>), Defect> {
+        let n = self.positions.len();
+        let mut first = vec![0u32; n + 2];
         for (f, face) in (0u32..).zip(&self.faces) {
-            for k in 0..3 {
-                let (from, to) = (face[k], face[(k + 1) % 3]);
-                if from as usize >= self.positions.len() {
-                    return Err(Defect::MissingVertex { face: f, vertex: from });
-                }
-                if from == to {
-                    return Err(Defect::RepeatedCorner { face: f });
-                }
-                directed.push((from, to, 3 * f + k as u32));
+            if let Some(&vertex) = face.iter().find(|&&v| v as usize >= n) {
+                return Err(Defect::MissingVertex { face: f, vertex });
             }
+            if face[0] == face[1] || face[1] == face[2] || face[2] == face[0] {
+                return Err(Defect::RepeatedCorner { face: f });
+            }
+            face.iter().for_each(|&v| first[v as usize + 2] += 1);
         }
-        Ok(directed)
+        for v in 0..=n {
+            first[v + 1] += first[v];
+        }
+        let mut leaving = vec![0u32; 3 * self.faces.len()];
+        for (h, &v) in (0u32..).zip(self.faces.iter().flatten()) {
+            let row = &mut first[v as usize + 1];
+            leaving[*row as usize] = h;
+            *row += 1;
+        }
+        first.truncate(n + 1);
+        Ok((first, leaving))
     }
 
     /// Checks that every vertex has exactly one fan of faces; `opposite` from [`Self::opposites`].
