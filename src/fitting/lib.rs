@@ -1,1 +1,6 @@
-//! What several stages share of the method: projection, shape operator, edge weights
+//! What several stages share of the method: projection, shape operator, edge-end weights.
+
+pub mod edge_end;
+pub mod patch_fit;
+pub mod projection;
+pub mod shape;
