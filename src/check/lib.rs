@@ -1,1 +1,30 @@
-//! The outside checker: continuity, distance, watertightness and topology of finished patches
+//! A finished surface becomes a report of figures and a verdict: the outside checker.
+//!
+//! It sees what a user of the surface sees, the expanded nets and the face list, and nothing of
+//! how they were made. It finds neighbours itself, evaluates patches with its own code and
+//! derives the weights of the G1 conditions from the nets, so a defect of the solvers cannot
+//! hide in code that both share. A figure that is not a number fails the check.
+
+mod checker;
+mod continuity;
+mod distance;
+mod evaluate;
+mod foot;
+mod lent_threads;
+mod params;
+mod report;
+mod sector;
+mod surface;
+mod topology;
+mod verdict;
+
+#[cfg(test)]
+mod box_spline;
+#[cfg(test)]
+mod seeded_defects;
+
+pub use checker::{Job, check};
+pub use lent_threads::{ForEach, on_this_thread};
+pub use params::{CheckParams, Expected};
+pub use report::{CheckReport, Component, EdgeDefects, Place};
+pub use surface::{Net, Surface, SurfaceError};
