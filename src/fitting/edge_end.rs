@@ -5,7 +5,11 @@ use isospline_geometry::{HalfEdge, Vec3};
 
 /// Control points q0..q4 of the curve of half-edge `h`, from its origin.
 #[inline]
-pub fn outgoing_curve(mesh: &BaseMeshView<'_>, network: &NetworkView<'_>, h: HalfEdge) -> [Vec3; 5] {
+pub fn outgoing_curve(
+    mesh: &BaseMeshView<'_>,
+    network: &NetworkView<'_>,
+    h: HalfEdge,
+) -> [Vec3; 5] {
     let e = mesh.edge_of[h.row()] as usize;
     let [a, b] = mesh.edge[e].map(|v| Vec3::from(mesh.position[v as usize]));
     let c = &network.control[e];

@@ -1,8 +1,8 @@
 //! Normal and second fundamental form of a level set.
 
 use isospline_geometry::{Mat3, Vec3};
-use isospline_implicit::field::{SymMat3, full};
 use isospline_implicit::Jet2;
+use isospline_implicit::field::{SymMat3, full};
 
 /// Second fundamental form `M = -P H P / |grad f|`, `P = I - N N^T` [derived; TK, Eq. (5) is not
 /// symmetric and has the other sign], with respect to the outward normal `N`.

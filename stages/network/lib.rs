@@ -1,1 +1,154 @@
-//! Stage network
+//! Stage network: a quartic boundary curve for every edge of the base mesh.
+
+mod curve;
+mod error;
+mod params;
+mod samples;
+
+pub use curve::{Ends, Solution, fit_curve};
+pub use error::NetworkError;
+pub use params::{Method, NetworkParams};
+
+use isospline_artifact::kinds::{
+    BaseMeshView, Bounds, CurvatureView, CurveFit, CurveStatus, Network,
+};
+use isospline_fitting::projection::project_all;
+use isospline_geometry::Vec3;
+use isospline_implicit::Jet1;
+use isospline_stage::plan::{Need, cut, ranges};
+use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
+use samples::Samples;
+use std::ops::Range;
+
+/// Fits each edge by itself under the curvature conditions [TK, Eq. (9)].
+#[derive(Clone, Debug)]
+pub struct NetworkStage {
+    samples: Samples,
+}
+
+impl Stage for NetworkStage {
+    const NAME: &'static str = "network";
+    const VERSION: u32 = 1;
+    type Params = NetworkParams;
+    type Whole<'a> = (BaseMeshView<'a>,);
+    type Rows<'a> = (CurvatureView<'a>,);
+    type Output = Network;
+    type Error = NetworkError;
+
+    fn prepare(
+        _: &Ctx<'_>,
+        params: &NetworkParams,
+        _: (BaseMeshView<'_>,),
+    ) -> Result<Self, NetworkError> {
+        Ok(Self { samples: Samples::new(params.samples) })
+    }
+
+    fn plan(&self, (mesh,): (BaseMeshView<'_>,), rows_per_task: usize) -> Plan {
+        let n_edges = mesh.edge.len();
+        let tasks = cut(n_edges, rows_per_task).map(|rows| {
+            let sectors = rows.clone().flat_map(|e| end_sectors(&mesh, e)).collect();
+            let needs = vec![Need { input: 0, section: "shape", rows: ranges(sectors) }];
+            Task { writes: vec![rows; 3], needs }
+        });
+        Plan::Rows { lengths: vec![n_edges; 3], tasks: tasks.collect() }
+    }
+
+    fn process(
+        &self,
+        ctx: &Ctx<'_>,
+        (mesh,): (BaseMeshView<'_>,),
+        (curvature,): (CurvatureView<'_>,),
+        task: &Task,
+    ) -> Result<Piece<Network>, NetworkError> {
+        let edges = task.writes[0].clone();
+        let bounds = mesh.bounds[0];
+        let targets = self.targets(ctx, &mesh, &bounds, edges.clone());
+        let mut piece = Piece::<Network>::default();
+        for (edge, targets) in edges.clone().zip(targets.chunks_exact(self.samples.len())) {
+            let solution = fit_curve(&ends(&mesh, &curvature, edge), &self.samples, targets)
+                .ok_or_else(|| no_curve(&mesh, edge))?;
+            record(&mut piece, &solution);
+        }
+        measure(ctx, &self.samples, &mesh, edges, &mut piece);
+        Ok(piece)
+    }
+}
+
+impl NetworkStage {
+    /// Projections of the inner sample points of the chords, edge after edge.
+    fn targets(
+        &self,
+        ctx: &Ctx<'_>,
+        mesh: &BaseMeshView<'_>,
+        bounds: &Bounds,
+        edges: Range<usize>,
+    ) -> Vec<Vec3> {
+        let mut points = Vec::with_capacity(edges.len() * self.samples.len());
+        for edge in edges {
+            let [a, b] = mesh.edge[edge].map(|v| Vec3::from(mesh.position[v as usize]));
+            points.extend(self.samples.parameters().map(|t| a + t * (b - a)));
+        }
+        // A target that misses the surface only biases the fit; the checks measure the result.
+        project_all(ctx.field, bounds.diagonal, &mut points);
+        points
+    }
+}
+
+/// Sectors at the two ends of an edge: those of its first half-edge and of the opposite one.
+fn end_sectors(mesh: &BaseMeshView<'_>, edge: usize) -> [usize; 2] {
+    mesh.edge_half[edge].map(|h| mesh.sector[h as usize] as usize)
+}
+
+fn ends(mesh: &BaseMeshView<'_>, curvature: &CurvatureView<'_>, edge: usize) -> Ends {
+    let sectors = end_sectors(mesh, edge);
+    Ends {
+        points: mesh.edge[edge].map(|v| Vec3::from(mesh.position[v as usize])),
+        normals: sectors.map(|s| Vec3::from(mesh.frame[s].normal)),
+        shapes: sectors.map(|s| curvature.shape[s]),
+    }
+}
+
+fn no_curve(mesh: &BaseMeshView<'_>, edge: usize) -> NetworkError {
+    let [a, b] = mesh.edge[edge].map(|v| Vec3::from(mesh.position[v as usize]));
+    NetworkError::NoCurve { edge: edge as u32, place: 0.5 * (a + b) }
+}
+
+fn record(piece: &mut Piece<Network>, solution: &Solution) {
+    let [q1, q2, q3] = solution.inner;
+    piece.rows.control.push([q1.x, q1.y, q1.z, q2.x, q2.y, q2.z, q3.x, q3.y, q3.z]);
+    piece.rows.tangent.push(solution.tangent);
+    piece.rows.fit.push(CurveFit {
+        residual: solution.residual,
+        error: 0.0,
+        iterations: solution.iterations,
+        status: solution.status.code(),
+    });
+    let counters = &mut piece.counters;
+    counters.count("curve_iterations", u64::from(solution.iterations));
+    counters.count("curves", 1);
+    counters.max("curve_iterations_max", f64::from(solution.iterations));
+    counters.repair("curves_clamped", u64::from(solution.status == CurveStatus::Clamped));
+}
+
+/// Fills in the distance of each curve to the surface at the inner samples.
+fn measure(
+    ctx: &Ctx<'_>,
+    samples: &Samples,
+    mesh: &BaseMeshView<'_>,
+    edges: Range<usize>,
+    piece: &mut Piece<Network>,
+) {
+    let mut points = Vec::with_capacity(edges.len() * samples.len());
+    for (edge, c) in edges.zip(&piece.rows.control) {
+        let [a, b] = mesh.edge[edge].map(|v| Vec3::from(mesh.position[v as usize]));
+        let at = |k: usize| Vec3::new(c[3 * k], c[3 * k + 1], c[3 * k + 2]);
+        points.extend(samples.curve_points(&[a, at(0), at(1), at(2), b]));
+    }
+    let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
+    ctx.field.gradients(&points, &mut jets);
+    for (fit, jets) in piece.rows.fit.iter_mut().zip(jets.chunks_exact(samples.len())) {
+        let distance = |jet: &Jet1| jet.value.abs() / jet.gradient.norm();
+        fit.error = jets.iter().map(distance).fold(0.0, f64::max);
+        piece.counters.max("curve_distance_max_rel", fit.error / mesh.bounds[0].diagonal);
+    }
+}
