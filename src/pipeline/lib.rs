@@ -1,1 +1,34 @@
-//! Graph, keys and staleness, driver, threads, channels and progress events
+//! A graph of stages becomes artifacts in a store: keys, staleness, driver, threads, events.
+//!
+//! The only crate that starts threads and reads clocks. [`Pipeline::status`] says what is fresh
+//! and why the rest is not; [`Pipeline::run`] computes the rest.
+
+mod clock;
+pub mod driver;
+mod erase;
+pub mod error;
+pub mod event;
+mod execute;
+mod finisher;
+pub mod freshness;
+pub mod graph;
+mod host;
+pub mod keys;
+mod memory;
+pub mod options;
+pub mod provenance;
+pub mod registry;
+pub mod report;
+mod tiling;
+mod workers;
+
+pub use driver::Pipeline;
+pub use error::{GraphError, ParamsError, RunError, StageFailure};
+pub use event::Event;
+pub use freshness::{NodeStatus, State};
+pub use graph::{Given, Graph, ModelKey, Node};
+pub use keys::Reason;
+pub use options::{RunOptions, Scene};
+pub use provenance::{Provenance, read_provenance};
+pub use registry::{Registry, StageInfo};
+pub use report::{NodeReport, Outcome, RunReport};

@@ -69,7 +69,7 @@ pub struct FaceFit {
 }
 
 artifact! {
-    /// Interior control points of the G0 surface (g0_fit).
+    /// Interior control points of the G0 surface (`g0_fit`).
     pub struct G0Fit / G0FitView = "g0_fit", schema 1 {
         /// The 15 interior control points in storage order.
         interior: [f64; 45], Faces;
@@ -79,7 +79,7 @@ artifact! {
 }
 
 artifact! {
-    /// Twist points and edge-end weights (vertex_systems); rows in star order.
+    /// Twist points and edge-end weights (`vertex_systems`); rows in star order.
     pub struct VertexSystems / VertexSystemsView = "vertex_systems", schema 1 {
         /// Twist point of the face left of each outgoing half-edge.
         twist: [f64; 3], HalfEdges;
@@ -103,7 +103,7 @@ pub struct EdgeWeights {
 }
 
 artifact! {
-    /// First inner rows (edge_systems).
+    /// First inner rows (`edge_systems`).
     pub struct EdgeSystems / EdgeSystemsView = "edge_systems", schema 1 {
         /// p2, p3, p4 of the face of half-edge a -> b.
         left: [f64; 9], Edges;

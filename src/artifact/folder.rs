@@ -1,0 +1,252 @@
+//! A store in a folder: one file an artifact, mapped for reading.
+
+#![expect(clippy::disallowed_methods, reason = "artifact files are opened here")]
+
+use crate::commit::{replace_file, sync_folder};
+use crate::store::{Frozen, Partial, Publish};
+use crate::{Bytes, Durability, Lock, Store, StoreError};
+use memmap2::Mmap;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Suffix of artifact files.
+pub const SUFFIX: &str = ".isos";
+/// Appended to the name of a file that is being written.
+const PARTIAL: &str = ".partial";
+const LOCK: &str = ".lock";
+
+/// Artifacts of one model in one folder.
+#[derive(Clone, Debug)]
+pub struct FolderStore {
+    folder: PathBuf,
+    durability: Durability,
+}
+
+impl FolderStore {
+    /// The store in `folder`; the folder is made when the store is first locked.
+    pub fn new(folder: impl Into<PathBuf>, durability: Durability) -> Self {
+        Self { folder: folder.into(), durability }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The file of this name.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+}
+
+impl Store for FolderStore {
+    fn describe(&self, name: &str) -> String {
+        self.path(name).display().to_string()
+    }
+
+    fn lock(&self) -> Result<Box<dyn Lock>, StoreError> {
+        let made = std::fs::create_dir_all(&self.folder);
+        made.map_err(StoreError::io("create", &self.folder))?;
+        let path = self.path(LOCK);
+        let mut options = OpenOptions::new();
+        let file = options.create(true).truncate(false).write(true).open(&path);
+        let file = file.map_err(StoreError::io("open", &path))?;
+        match file.try_lock() {
+            Ok(()) => Ok(Box::new(Held { _file: file })),
+            Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path: self.folder.clone() }),
+            Err(TryLockError::Error(e)) => Err(StoreError::io("lock", path)(e)),
+        }
+    }
+
+    fn names(&self) -> Result<Vec<String>, StoreError> {
+        let failed = || StoreError::io("list", &self.folder);
+        let entries = match std::fs::read_dir(&self.folder) {
+            Ok(entries) => entries,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(e) => return Err(failed()(e)),
+        };
+        let mut names = Vec::new();
+        for entry in entries {
+            let name = entry.map_err(failed())?.file_name();
+            names.extend(name.to_str().filter(|n| n.ends_with(SUFFIX)).map(str::to_owned));
+        }
+        names.sort();
+        Ok(names)
+    }
+
+    fn create(&self, name: &str, length: u64) -> Result<Box<dyn Partial>, StoreError> {
+        let target = self.path(name);
+        let path = self.path(&format!("{name}{PARTIAL}"));
+        let mut options = OpenOptions::new();
+        let file = options.create(true).truncate(true).read(true).write(true).open(&path);
+        let file = file.map_err(StoreError::io("create", &path))?;
+        let draft = Draft { path, target, durability: self.durability, kept: false };
+        set_aside(&file, length).map_err(StoreError::io("set aside space for", &draft.path))?;
+        Ok(Box::new(Growing { file, draft, map: None }))
+    }
+
+    fn read(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
+        let path = self.path(name);
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(StoreError::io("open", path)(e)),
+        };
+        Ok(Some(Arc::new(map(&file, &path)?)))
+    }
+
+    fn write_note(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        replace_file(&self.path(name), self.durability, |out| out.write_all(bytes))
+    }
+
+    fn read_note(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        let path = self.path(name);
+        match std::fs::read(&path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(StoreError::io("read", path)(e)),
+        }
+    }
+
+    fn remove(&self, name: &str) -> Result<(), StoreError> {
+        let path = self.path(name);
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != ErrorKind::NotFound => Err(StoreError::io("remove", path)(e)),
+            _ => Ok(()),
+        }
+    }
+
+    fn sync_names(&self) -> Result<(), StoreError> {
+        match self.durability {
+            Durability::Durable => sync_folder(&self.folder),
+            Durability::Fast => Ok(()),
+        }
+    }
+}
+
+/// The lock is the open file: the system frees it when the process ends, however it ends.
+#[derive(Debug)]
+struct Held {
+    _file: File,
+}
+
+impl Lock for Held {}
+
+/// Names of a file in the making; removes it if it is dropped before it got its final name.
+#[derive(Debug)]
+struct Draft {
+    path: PathBuf,
+    target: PathBuf,
+    durability: Durability,
+    kept: bool,
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if !self.kept {
+            // What cannot be removed is overwritten by the next run and never taken for whole.
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Growing {
+    file: File,
+    draft: Draft,
+    map: Option<Mapped>,
+}
+
+impl Partial for Growing {
+    fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), StoreError> {
+        write_all_at(&self.file, bytes, offset).map_err(StoreError::io("write", &self.draft.path))
+    }
+
+    fn bytes(&mut self) -> Result<&[u8], StoreError> {
+        if self.map.is_none() {
+            self.map = Some(map(&self.file, &self.draft.path)?);
+        }
+        Ok(self.map.as_ref().map_or(&[], Mapped::bytes))
+    }
+
+    fn freeze(mut self: Box<Self>) -> Result<Frozen, StoreError> {
+        self.bytes()?;
+        let Self { file, draft, map } = *self;
+        let map = map.expect("invariant: mapped just now");
+        Ok(Frozen { bytes: Arc::new(map), publish: Box::new(Ready { file, draft }) })
+    }
+}
+
+#[derive(Debug)]
+struct Ready {
+    file: File,
+    draft: Draft,
+}
+
+impl Publish for Ready {
+    fn publish(mut self: Box<Self>) -> Result<(), StoreError> {
+        if self.draft.durability == Durability::Durable {
+            self.file.sync_all().map_err(StoreError::io("sync", &self.draft.path))?;
+        }
+        let renamed = std::fs::rename(&self.draft.path, &self.draft.target);
+        renamed.map_err(StoreError::io("rename", &self.draft.path))?;
+        self.draft.kept = true;
+        Ok(())
+    }
+}
+
+/// A mapped file; `None` for an empty one, which cannot be mapped.
+#[derive(Debug)]
+struct Mapped(Option<Mmap>);
+
+impl Bytes for Mapped {
+    fn bytes(&self) -> &[u8] {
+        self.0.as_deref().unwrap_or(&[])
+    }
+}
+
+#[expect(unsafe_code, reason = "mapping a file is unsafe: others could change it")]
+fn map(file: &File, path: &Path) -> Result<Mapped, StoreError> {
+    let length = file.metadata().map_err(StoreError::io("read", path))?.len();
+    if length == 0 {
+        return Ok(Mapped(None));
+    }
+    // SAFETY: a file with its final name is never written again, only replaced by rename, which
+    // leaves the mapped inode as it is. A partial file is written only through `Growing`, whose
+    // `bytes` borrows it for as long as the slice lives, and the model folder's lock keeps other
+    // processes away. Gain: rows are read from the page cache without a copy, and artifacts
+    // larger than memory can be used.
+    let map = unsafe { Mmap::map(file) };
+    map.map(|m| Mapped(Some(m))).map_err(StoreError::io("map", path))
+}
+
+#[cfg(unix)]
+fn write_all_at(file: &File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, bytes, offset)
+}
+
+#[cfg(not(unix))]
+fn write_all_at(mut file: &File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
+    use std::io::{Seek, SeekFrom, Write};
+    file.seek(SeekFrom::Start(offset))?;
+    file.write_all(bytes)
+}
+
+/// Reserves the file's blocks, so that a full disk shows before the work and not after it.
+fn set_aside(file: &File, length: u64) -> std::io::Result<()> {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::fs::{FallocateFlags, fallocate};
+        use rustix::io::Errno;
+        loop {
+            match fallocate(file, FallocateFlags::empty(), 0, length) {
+                Err(Errno::INTR) => {}
+                Err(Errno::OPNOTSUPP | Errno::NOSYS) => break,
+                done => return Ok(done?),
+            }
+        }
+    }
+    file.set_len(length)
+}

@@ -1,0 +1,190 @@
+//! Which artifacts are what the graph asks for, and why the others are not.
+
+use crate::keys::{Ingredient, changes, ingredients, key_of};
+use crate::provenance::InputRecord;
+use crate::{Pipeline, Reason, RunError, StageInfo, read_provenance};
+use isospline_artifact::{Container, Key, StoreError};
+use std::fmt;
+
+/// Whether a node's artifact can be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// It is what the graph asks for.
+    Fresh,
+    /// It was made from something else.
+    Stale(Vec<Reason>),
+    /// It is not there.
+    Missing,
+    /// It is not whole.
+    Damaged(String),
+}
+
+/// State of one node.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NodeStatus {
+    /// Place in the graph.
+    pub node: usize,
+    /// Label.
+    pub stage: String,
+    /// Name of the artifact in the store.
+    pub artifact: String,
+    /// Its state.
+    pub state: State,
+}
+
+impl fmt::Display for NodeStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.state {
+            State::Fresh => write!(f, "{} is fresh", self.stage),
+            State::Stale(reasons) => {
+                let reasons: Vec<String> = reasons.iter().map(ToString::to_string).collect();
+                write!(f, "{} is stale: {}", self.stage, reasons.join(", "))
+            }
+            State::Missing => write!(f, "{} is missing", self.stage),
+            State::Damaged(damage) => write!(f, "{} is damaged: {damage}", self.stage),
+        }
+    }
+}
+
+/// A node with all that is known of it before anything runs.
+#[derive(Clone, Debug)]
+pub(crate) struct Resolved {
+    pub(crate) info: StageInfo,
+    pub(crate) label: String,
+    pub(crate) artifact: String,
+    pub(crate) params: serde_json::Value,
+    pub(crate) ingredients: Vec<Ingredient>,
+    pub(crate) recipe: Key,
+    pub(crate) inputs: Vec<Input>,
+}
+
+/// One artifact that a node reads.
+#[derive(Clone, Debug)]
+pub(crate) struct Input {
+    pub(crate) label: String,
+    pub(crate) kind: &'static str,
+    pub(crate) recipe: Key,
+    pub(crate) source: Source,
+}
+
+/// Where an input comes from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Source {
+    Node(usize),
+    Given(usize, Key),
+}
+
+impl Input {
+    /// Key of its rows, where it is known.
+    pub(crate) fn content(&self, contents: &[Option<Key>]) -> Option<Key> {
+        match self.source {
+            Source::Node(node) => contents[node],
+            Source::Given(_, content) => Some(content),
+        }
+    }
+}
+
+impl Resolved {
+    /// The key over the contents of the inputs, where all are known.
+    pub(crate) fn derivation(&self, contents: &[Option<Key>]) -> Option<Key> {
+        let inputs = self.inputs.iter().map(|i| Some((i.kind, i.content(contents)?)));
+        let inputs: Option<Vec<_>> = inputs.collect();
+        Some(key_of("isospline derivation", &self.ingredients, inputs?))
+    }
+
+    /// The inputs as the record names them.
+    pub(crate) fn input_records(&self, contents: &[Option<Key>]) -> Vec<InputRecord> {
+        let record = |input: &Input| InputRecord {
+            label: input.label.clone(),
+            kind: input.kind.to_owned(),
+            recipe: input.recipe,
+            content: input.content(contents).unwrap_or_default(),
+        };
+        self.inputs.iter().map(record).collect()
+    }
+}
+
+/// Parameters, ingredients and recipes of all nodes; nothing is read.
+pub(crate) fn resolve(pipeline: &Pipeline<'_>) -> Result<Vec<Resolved>, RunError> {
+    pipeline.graph.check(pipeline.registry)?;
+    let mut nodes: Vec<Resolved> = Vec::with_capacity(pipeline.graph.nodes.len());
+    for node in &pipeline.graph.nodes {
+        let stage = pipeline.registry.erased(&node.stage).expect("invariant: graph is checked");
+        let label = node.label();
+        let params = stage.canonical_params(&node.params);
+        let params = params.map_err(|source| RunError::Params { stage: label.clone(), source })?;
+        let ingredients = ingredients(stage.info(), node, &params, pipeline.model);
+        let from_node = |&idx: &usize| Input {
+            label: nodes[idx].label.clone(),
+            kind: nodes[idx].info.kind,
+            recipe: nodes[idx].recipe,
+            source: Source::Node(idx),
+        };
+        let from_outside = |(k, given): (usize, &crate::Given)| Input {
+            label: given.label.clone(),
+            kind: given.kind,
+            recipe: given.content,
+            source: Source::Given(k, given.content),
+        };
+        let given = node.given.iter().enumerate().map(from_outside);
+        let inputs: Vec<Input> = node.inputs.iter().map(from_node).chain(given).collect();
+        let keys = inputs.iter().map(|i| (i.kind, i.recipe));
+        let recipe = key_of("isospline recipe", &ingredients, keys);
+        let artifact = pipeline.registry.artifact_name(node);
+        let info = *stage.info();
+        nodes.push(Resolved { info, label, artifact, params, ingredients, recipe, inputs });
+    }
+    Ok(nodes)
+}
+
+/// State of a node, and its artifact (rows unread) if that is fresh.
+pub(crate) fn assess(
+    pipeline: &Pipeline<'_>,
+    node: &Resolved,
+    contents: &[Option<Key>],
+) -> Result<(State, Option<Container>), StoreError> {
+    let container = match pipeline.store.peek(&node.artifact) {
+        Ok(Some(container)) => container,
+        Ok(None) => return Ok((State::Missing, None)),
+        Err(StoreError::Damaged { damage, .. }) => {
+            return Ok((State::Damaged(damage.to_string()), None));
+        }
+        Err(error) => return Err(error),
+    };
+    if !pipeline.model.hashable {
+        return Ok((State::Stale(vec![Reason::Unhashable]), None));
+    }
+    let header = container.header();
+    let same_inputs = || node.derivation(contents) == Some(header.derivation);
+    if header.recipe == node.recipe || same_inputs() {
+        return Ok((State::Fresh, Some(container)));
+    }
+    Ok((State::Stale(reasons(pipeline, node, contents, header.recipe)?), None))
+}
+
+fn reasons(
+    pipeline: &Pipeline<'_>,
+    node: &Resolved,
+    contents: &[Option<Key>],
+    recipe: Key,
+) -> Result<Vec<Reason>, StoreError> {
+    let record = read_provenance(pipeline.store, &node.artifact)?;
+    let Some(record) = record.filter(|r| r.recipe == recipe) else {
+        return Ok(vec![Reason::Unrecorded]);
+    };
+    let mut reasons = changes(&record.ingredients, &node.ingredients);
+    for (k, input) in node.inputs.iter().enumerate() {
+        let old = record.inputs.get(k).map(|i| (i.kind.as_str(), i.content));
+        match input.content(contents) {
+            None => reasons.push(Reason::Pending { stage: input.label.clone() }),
+            Some(new) if old != Some((input.kind, new)) => {
+                reasons.push(Reason::Input { kind: input.kind.to_owned() });
+            }
+            Some(_) => {}
+        }
+    }
+    if reasons.is_empty() {
+        reasons.push(Reason::Unrecorded);
+    }
+    Ok(reasons)
+}

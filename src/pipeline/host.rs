@@ -1,0 +1,56 @@
+//! The pipeline's side of [`Host`]: threads for whole stages, progress, the stop flag.
+
+use crate::Event;
+use isospline_stage::{Host, Stopped};
+use rayon::prelude::*;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Listener to events.
+pub(crate) type Listener<'a> = &'a (dyn Fn(&Event) + Sync);
+
+/// Threads for `for_each`, started when first used.
+pub(crate) struct Pool {
+    threads: usize,
+    pool: OnceLock<Option<rayon::ThreadPool>>,
+}
+
+impl Pool {
+    pub(crate) fn new(threads: usize) -> Self {
+        Self { threads, pool: OnceLock::new() }
+    }
+
+    /// `None` where one thread does, or where the system gives no more: the caller's thread then
+    /// does all, with the same results.
+    fn get(&self) -> Option<&rayon::ThreadPool> {
+        let build = || rayon::ThreadPoolBuilder::new().num_threads(self.threads).build().ok();
+        if self.threads < 2 { None } else { self.pool.get_or_init(build).as_ref() }
+    }
+}
+
+/// What one node sees of the run.
+#[derive(Clone, Copy)]
+pub(crate) struct StageHost<'a> {
+    pub(crate) node: usize,
+    pub(crate) label: &'a str,
+    pub(crate) pool: &'a Pool,
+    pub(crate) stop: &'a AtomicBool,
+    pub(crate) events: Listener<'a>,
+}
+
+impl Host for StageHost<'_> {
+    fn for_each(&self, n: usize, body: &(dyn Fn(usize) + Sync)) {
+        match self.pool.get() {
+            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().for_each(body)),
+            _ => (0..n).for_each(body),
+        }
+    }
+
+    fn progress(&self, done: u64, of: u64) -> Result<(), Stopped> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(Stopped);
+        }
+        (self.events)(&Event::Progress { node: self.node, stage: self.label.to_owned(), done, of });
+        Ok(())
+    }
+}
