@@ -1,0 +1,52 @@
+# The list of commands. `make` alone prints it.
+.DEFAULT_GOAL := help
+.PHONY: help build deccube paper test lint unit doc readers bench golden docs clean
+
+CARGO ?= cargo
+ISOSPLINE := target/release/isospline
+# The models of [TK] Fig. 9-15, in its order.
+PAPER := torus_regular torus dodecahedron double_torus mcmullen chair deccube
+
+help: ## print this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+build: ## build the release binary, target/release/isospline
+	$(CARGO) build --release -p isospline
+
+deccube: build ## convert the decorative cube, check it, write out/deccube/deccube.{glb,vtu}
+	$(ISOSPLINE) run configs/deccube.toml
+	$(ISOSPLINE) export out/deccube --format glb
+	$(ISOSPLINE) export out/deccube --format vtu
+
+paper: build ## convert all models of the paper and print its Table 3 with our figures
+	@for model in $(PAPER); do $(ISOSPLINE) run configs/$$model.toml || exit $$?; done
+	$(CARGO) run --release -q -p isospline --example paper_table -- $(PAPER:%=out/%)
+
+test: lint unit docs readers ## format and lint checks, all tests, docs, foreign readers
+
+lint: ## rustfmt and clippy, warnings are errors
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --workspace --all-targets -- -D warnings
+
+unit:
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+		$(CARGO) nextest run --workspace --no-fail-fast && $(CARGO) test --workspace --doc -q; \
+	else \
+		$(CARGO) test --workspace --no-fail-fast; \
+	fi
+
+readers: build ## read the exports with vtk, trimesh and numpy
+	bash tests/readers/run.sh
+
+bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50k faces
+	$(CARGO) bench --workspace
+	$(CARGO) run --release -q -p isospline --example stage_times
+
+golden: ## rewrite tests/golden; review the diff
+	ISOSPLINE_GOLDEN=rewrite $(CARGO) test -p isospline-tests --test golden
+
+docs: ## build the API documentation, target/doc/isospline/index.html
+	$(CARGO) doc --workspace --no-deps -q
+
+clean: ## remove target, out and the readers' environment
+	rm -rf target out .venv
