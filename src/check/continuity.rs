@@ -28,7 +28,7 @@ pub(crate) fn measure(surface: &Surface, topology: &Topology, for_each: ForEach<
     let table = bernstein_table();
     let joints = &topology.joints;
     let edges = map(for_each, joints.len(), |range| {
-        joints[range].iter().map(|joint| EdgeFigures::of(surface, joint, &table)).collect()
+        joints[range].iter().map(|&joint| EdgeFigures::of(surface, joint, &table)).collect()
     });
     let mut out = corners(surface);
     for edge in &edges {
@@ -77,7 +77,7 @@ struct EdgeFigures {
 }
 
 impl EdgeFigures {
-    fn of(surface: &Surface, joint: &Joint, table: &[[f64; DEGREE]]) -> Self {
+    fn of(surface: &Surface, joint: Joint, table: &[[f64; DEGREE]]) -> Self {
         let left = EdgeRows::of(surface, joint.left);
         let right = EdgeRows::of(surface, joint.right);
         let mut out = Self {
@@ -143,8 +143,8 @@ impl EdgeRows {
         }
         let normal = along.cross(&across);
         // Below a sine of 1e-10 half of the digits of the normal are rounding.
-        let floor = 1e-10 * along.norm() * across.norm();
-        (normal.norm() > floor).then_some(normal)
+        let floor_sq = 1e-20 * along.norm_squared() * across.norm_squared();
+        (normal.norm_squared() > floor_sq).then_some(normal)
     }
 
     fn point(&self, weights: &[f64; DEGREE], i: usize) -> Vec3 {

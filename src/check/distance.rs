@@ -1,6 +1,6 @@
 //! Distance, normals and flips of patches against the field, on a sample grid.
 
-use crate::evaluate::{PreparedPatch, Stencil};
+use crate::evaluate::{PreparedPatch, Stencil, StencilTable};
 use crate::lent_threads::{ForEach, map};
 use crate::report::{Place, worse};
 use crate::surface::{Net, Surface};
@@ -18,7 +18,7 @@ pub(crate) struct FaceFigures {
     pub(crate) worst: usize,
     sum: f64,
     sum_sq: f64,
-    /// Largest angle between patch normal and gradient, as (sine, cosine) times a length.
+    /// Largest angle between patch normal and gradient.
     steepest: Slope,
     /// Grid index of `steepest`.
     steepest_at: usize,
@@ -42,12 +42,12 @@ pub(crate) struct Distance {
 }
 
 pub(crate) fn measure(surface: &Surface, field: &dyn Field, for_each: ForEach<'_>) -> Distance {
-    let grid = Stencil::grid(GRID);
+    let grid = StencilTable::grid(GRID);
     let faces = map(for_each, surface.nets().len(), |range| {
         let mut sampler = Sampler::new(field, &grid);
         surface.nets()[range].iter().map(|net| sampler.measure(net)).collect()
     });
-    let n_samples = (faces.len() * grid.len()) as f64;
+    let n_samples = (faces.len() * grid.stencils().len()) as f64;
     let mut out = Distance {
         max: faces.iter().fold(0.0, |acc, f| worse(acc, f.max)),
         rms: (faces.iter().map(|f| f.sum_sq).sum::<f64>() / n_samples).sqrt(),
@@ -62,7 +62,8 @@ pub(crate) fn measure(surface: &Surface, field: &dyn Field, for_each: ForEach<'_
     for (f, figures) in out.faces.iter().enumerate() {
         let angle = figures.steepest.angle_deg();
         if out.worst_normal.is_none() || angle > out.normal_deg_max {
-            out.worst_normal = Some(place(surface, f, &grid[figures.steepest_at], angle));
+            out.worst_normal =
+                Some(place(surface, f, &grid.stencils()[figures.steepest_at], angle));
         }
         out.normal_deg_max = worse(out.normal_deg_max, angle);
     }
@@ -86,31 +87,32 @@ pub(crate) fn first_order(jet: &Jet1) -> f64 {
 /// Scratch of one thread: a patch's points, normals and field values.
 struct Sampler<'a> {
     field: &'a dyn Field,
-    grid: &'a [Stencil],
+    grid: &'a StencilTable,
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
     jets: Vec<Jet1>,
 }
 
 impl<'a> Sampler<'a> {
-    fn new(field: &'a dyn Field, grid: &'a [Stencil]) -> Self {
+    fn new(field: &'a dyn Field, grid: &'a StencilTable) -> Self {
         let jet = Jet1 { value: 0.0, gradient: Vec3::zeros() };
-        let (points, jets) = (vec![Vec3::zeros(); grid.len()], vec![jet; grid.len()]);
+        let n = grid.stencils().len();
+        let (points, jets) = (vec![Vec3::zeros(); n], vec![jet; n]);
         Self { field, grid, normals: points.clone(), points, jets }
     }
 
     fn measure(&mut self, net: &Net) -> FaceFigures {
         let patch = PreparedPatch::new(net);
         let mut out = FaceFigures::default();
-        for (i, stencil) in self.grid.iter().enumerate() {
-            let at = patch.evaluate(stencil);
-            self.points[i] = at.point;
-            self.normals[i] = at.normal;
+        let (points, normals) = (&mut self.points, &mut self.normals);
+        patch.evaluate_all(self.grid, |i, at| {
+            points[i] = at.point;
+            normals[i] = at.normal;
             out.degenerate += u64::from(at.is_degenerate());
-        }
-        self.field.gradients(&self.points, &mut self.jets);
-        for i in 0..self.grid.len() {
-            out.enter(i, &self.normals[i], &self.jets[i]);
+        });
+        self.field.gradients(points, &mut self.jets);
+        for (i, (normal, jet)) in normals.iter().zip(&self.jets).enumerate() {
+            out.enter(i, normal, jet);
         }
         out
     }
@@ -136,36 +138,29 @@ impl FaceFigures {
 }
 
 /// An angle kept as (sine, cosine) times a common length: one arc tangent a patch is enough.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Slope {
     sine_sq: f64,
     cosine: f64,
-}
-
-impl Default for Slope {
-    fn default() -> Self {
-        Self { sine_sq: 0.0, cosine: 1.0 }
-    }
+    /// Grows with the angle, from 0 at 0 to 2 at half a turn; not-a-number for zero vectors.
+    rank: f64,
 }
 
 impl Slope {
+    #[inline]
     fn between(a: &Vec3, b: &Vec3) -> Self {
-        Self { sine_sq: a.cross(b).norm_squared(), cosine: a.dot(b) }
+        let (sine_sq, cosine) = (a.cross(b).norm_squared(), a.dot(b));
+        let part = sine_sq / (sine_sq + cosine * cosine);
+        Self { sine_sq, cosine, rank: if cosine < 0.0 { 2.0 - part } else { part } }
     }
 
-    /// Grows with the angle, from 0 at 0 to 2 at half a turn; not-a-number for zero vectors.
-    fn rank(&self) -> f64 {
-        let part = self.sine_sq / (self.sine_sq + self.cosine * self.cosine);
-        if self.cosine < 0.0 { 2.0 - part } else { part }
-    }
-
+    #[inline]
     fn is_steeper_than(&self, other: &Self) -> bool {
-        let (own, others) = (self.rank(), other.rank());
-        own > others || (own.is_nan() && !others.is_nan())
+        self.rank > other.rank || (self.rank.is_nan() && !other.rank.is_nan())
     }
 
     fn angle_deg(&self) -> f64 {
-        if self.rank().is_nan() {
+        if self.rank.is_nan() {
             return f64::NAN;
         }
         libm::atan2(self.sine_sq.sqrt(), self.cosine).to_degrees()
@@ -179,7 +174,7 @@ mod tests {
     #[test]
     fn slopes_rank_as_their_angles_do() {
         let turned = |a: f64| Vec3::new(libm::sin(a), 0.0, libm::cos(a));
-        let angles = [1e-9, 1e-4, 0.5, 1.5, 1.6, 3.0, 3.14];
+        let angles = [1e-9, 1e-4, 0.5, 1.5, 1.6, 3.0, 3.1];
         let slopes = angles.map(|a| Slope::between(&Vec3::z(), &(7.0 * turned(a))));
         for pair in slopes.windows(2) {
             assert!(pair[1].is_steeper_than(&pair[0]) && !pair[0].is_steeper_than(&pair[1]));

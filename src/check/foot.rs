@@ -1,7 +1,7 @@
 //! The largest distance, sought between the samples and confirmed by its foot point.
 
 use crate::distance::{Distance, GRID, first_order, place};
-use crate::evaluate::{PreparedPatch, Stencil};
+use crate::evaluate::{PreparedPatch, Stencil, StencilTable};
 use crate::report::{Place, worse};
 use crate::surface::Surface;
 use isospline_geometry::Vec3;
@@ -20,7 +20,7 @@ pub(crate) fn largest(
     field: &dyn Field,
     distance: &Distance,
 ) -> Option<(f64, Place)> {
-    let grid = Stencil::grid(GRID);
+    let grid = StencilTable::grid(GRID);
     let mut order: Vec<usize> = (0..distance.faces.len()).collect();
     // Not-a-number sorts first: it is the worst of all.
     order.sort_by(|&a, &b| distance.faces[b].max.total_cmp(&distance.faces[a].max));
@@ -28,10 +28,10 @@ pub(crate) fn largest(
     for (n, &f) in order.iter().enumerate() {
         let on_grid = distance.faces[f].max;
         let so_far = best.map_or(0.0, |(d, _)| d);
-        if best.is_some() && on_grid < MAY_STILL_WIN * so_far {
+        if best.is_some() && (so_far.is_nan() || on_grid < MAY_STILL_WIN * so_far) {
             break;
         }
-        let start = &grid[distance.faces[f].worst];
+        let start = &grid.stencils()[distance.faces[f].worst];
         if on_grid.is_nan() || n >= MAX_CANDIDATES {
             let better = worse(so_far, on_grid);
             if best.is_none() || better > so_far || better.is_nan() {
@@ -42,8 +42,9 @@ pub(crate) fn largest(
         let patch = PreparedPatch::new(&surface.nets()[f]);
         let (at, estimate) = climb(&patch, field, start.at, on_grid);
         let found = confirmed(patch.evaluate(&at).point, field).unwrap_or(estimate);
-        if best.is_none() || found > so_far {
-            best = Some((found, place(surface, f, &at, found)));
+        let better = worse(so_far, found);
+        if best.is_none() || better > so_far || better.is_nan() {
+            best = Some((better, place(surface, f, &at, better)));
         }
     }
     best
@@ -59,6 +60,9 @@ fn climb(patch: &PreparedPatch, field: &dyn Field, start: [f64; 3], value: f64) 
         for candidate in neighbours(best.at, step) {
             let stencil = Stencil::new(candidate);
             let found = first_order(&field.gradient(patch.evaluate(&stencil).point));
+            if found.is_nan() {
+                return (stencil, found);
+            }
             if found > height {
                 (best, height, has_moved) = (stencil, found, true);
             }

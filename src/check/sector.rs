@@ -22,7 +22,7 @@ pub(crate) struct Weights {
 /// and `[R,Q] > 0`; only that is asked, because two wrong signs give a quotient in range.
 pub(crate) fn measure(surface: &Surface, topology: &Topology, normals: &[Vec3]) -> Weights {
     let mut out = Weights { out_of_range: 0, min: 1.0, max: 0.0 };
-    for joint in &topology.joints {
+    for &joint in &topology.joints {
         for (h, opposite) in both_ends(joint) {
             let normal = normals[surface.origin(h) as usize];
             let [p, q, r] = spokes(surface, h, opposite);
@@ -36,7 +36,7 @@ pub(crate) fn measure(surface: &Surface, topology: &Topology, normals: &[Vec3]) 
     out
 }
 
-fn both_ends(joint: &Joint) -> [(HalfEdge, HalfEdge); 2] {
+fn both_ends(joint: Joint) -> [(HalfEdge, HalfEdge); 2] {
     [(joint.left, joint.right), (joint.right, joint.left)]
 }
 

@@ -2,7 +2,7 @@
 
 use crate::checker::Job;
 use crate::report::{CheckReport, EdgeDefects, Place};
-use std::fmt::Display;
+use std::fmt::{Display, Write};
 
 /// One sentence a broken limit; none if the surface passes.
 pub(crate) fn failures(report: &CheckReport, job: &Job<'_>) -> Vec<String> {
@@ -10,6 +10,7 @@ pub(crate) fn failures(report: &CheckReport, job: &Job<'_>) -> Vec<String> {
     shape(&mut out, report, job);
     continuity(&mut out, report, job);
     fidelity(&mut out, report, job);
+    unlimited(&mut out, report);
     out
 }
 
@@ -33,9 +34,9 @@ fn shape(out: &mut Vec<String>, report: &CheckReport, job: &Job<'_>) {
     none(out, loose_vertices, "vertices belong to no face");
     none(out, repeated_corners, "faces name a vertex twice");
     let expected = &job.expected;
-    equal(out, "components", report.components, expected.components);
-    let characteristic = report.euler_characteristic;
-    equal(out, "euler_characteristic", characteristic, expected.euler_characteristic);
+    equal(out, "components", &report.components, expected.components.as_ref());
+    let characteristic = &report.euler_characteristic;
+    equal(out, "euler_characteristic", characteristic, expected.euler_characteristic.as_ref());
 }
 
 /// No gap, no kink.
@@ -59,13 +60,26 @@ fn fidelity(out: &mut Vec<String>, report: &CheckReport, job: &Job<'_>) {
     at_most(out, ("vertex_error_max", report.vertex_error_max, None), params.vertices);
     let error = ("rel_error_max", report.rel_error_max, report.worst_error);
     at_most(out, error, params.error_limit(&job.expected));
-    // The foot point may only confirm what the grid saw, not talk it away unless it is sound.
-    if report.rel_error_rms.is_nan() {
-        out.push("rel_error_rms is not a number".to_owned());
-    }
     if report.flipped_patches > params.flipped_patches {
         let (found, limit) = (report.flipped_patches, params.flipped_patches);
         out.push(format!("{found} patches face inward somewhere, at most {limit} may"));
+    }
+}
+
+/// Figures without a limit of their own: they must at least be numbers.
+fn unlimited(out: &mut Vec<String>, report: &CheckReport) {
+    let figures = [
+        ("diagonal", report.diagonal),
+        ("g1_angle_deg_p99", report.g1_angle_deg_p99),
+        ("rel_error_grid_max", report.rel_error_grid_max),
+        ("rel_error_rms", report.rel_error_rms),
+        ("rel_error_mean", report.rel_error_mean),
+        ("normal_error_deg_max", report.normal_error_deg_max),
+        ("lambda0_min", report.lambda0_min),
+        ("lambda0_max", report.lambda0_max),
+    ];
+    for (name, _) in figures.into_iter().filter(|(_, value)| !value.is_finite()) {
+        out.push(format!("{name} is not a finite number"));
     }
 }
 
@@ -75,7 +89,7 @@ fn none(out: &mut Vec<String>, found: u64, what: &str) {
     }
 }
 
-fn equal<T: PartialEq + Display>(out: &mut Vec<String>, name: &str, found: T, wanted: Option<T>) {
+fn equal<T: PartialEq + Display>(out: &mut Vec<String>, name: &str, found: &T, wanted: Option<&T>) {
     if let Some(wanted) = wanted
         && found != wanted
     {
@@ -90,7 +104,8 @@ fn at_most(out: &mut Vec<String>, (name, value, at): (&str, f64, Option<Place>),
     }
     let mut sentence = format!("{name} is {value:.3e}, the limit is {limit:.3e}");
     if let Some(Place { face, point: [x, y, z], .. }) = at {
-        sentence += &format!("; worst in face {face} at ({x:.6}, {y:.6}, {z:.6})");
+        write!(sentence, "; worst in face {face} at ({x:.6}, {y:.6}, {z:.6})")
+            .expect("invariant: a string takes all that is written");
     }
     out.push(sentence);
 }
