@@ -1,5 +1,7 @@
 //! The Stage trait: a pure function of inputs, parameters and field, cut into tasks.
 
+#[cfg(feature = "contract")]
+pub mod contract;
 pub mod counters;
 pub mod host;
 pub mod inputs;
