@@ -104,7 +104,9 @@ impl TriangleMesh {
             if face[0] == face[1] || face[1] == face[2] || face[2] == face[0] {
                 return Err(Defect::RepeatedCorner { face: f });
             }
-            face.iter().for_each(|&v| first[v as usize + 2] += 1);
+            for &v in face {
+                first[v as usize + 2] += 1;
+            }
         }
         for v in 0..=n {
             first[v + 1] += first[v];
