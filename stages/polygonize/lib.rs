@@ -1,1 +1,155 @@
-//! Stage polygonize
+//! Stage polygonize: a field becomes a closed triangle mesh about as fine as wanted.
+//!
+//! 1. A coarse pass counts triangles; the cell size follows from the faces wanted.
+//! 2. A tree of boxes, pruned by interval enclosures of f, gives all cells that the surface may
+//!    touch; cells are cut into Kuhn's six tetrahedra.
+//! 3. Tetrahedra that fail the interval test below are refined by conforming bisection.
+//! 4. Each tetrahedron with nodes on both sides gives a triangle or two, with corners at bracketed
+//!    roots of f on its edges; short edges are merged where the topology stays.
+//!
+//! # What is promised
+//! The mesh is closed, oriented and manifold whatever the field: it separates the inside from the
+//! outside nodes of a conforming complex.
+//!
+//! [`TopologyProof::Certified`] is stored if in addition, by interval arithmetic with outward
+//! rounding, f does not vanish on the sides of the box, nor on cells that were pruned, and every
+//! remaining tetrahedron T with linear interpolant L of its node values passes: each box of a
+//! cover of T has either f and L of one strict sign, or `grad L . g > 0` for all g in the
+//! enclosure of grad f. Then the separating surface is isotopic to `f = 0` in the box: the same
+//! number of components, the same genus of each, nested alike.
+//!
+//! This is the small normal variation of [PV04] with one of its two interval gradients replaced by
+//! the gradient of the mesh itself. Where the test of [PV04] holds in a cell
+//! (`0` not in `<G, G>`, G the interval gradient), this one holds for Kuhn's tetrahedra of that
+//! cell, because the components of grad L are difference quotients along axes, hence members
+//! of G. It needs no balanced tree, and boxes may be cut for the test alone.
+//!
+//! Proof \[derived\]. Let `F_s = (1-s) f + s L`, s in \[0, 1\], L continuous over the complex. If
+//! `F_s(x) = 0` for some s, then `f(x) L(x) <= 0`, so x lies in no pruned cell (there f and the
+//! node values, hence L on shared faces, have one sign), and in every tetrahedron T about x the
+//! second alternative holds: `g . a > 0` for `g = grad L` on T and all a in the generalized
+//! gradient of f at x. So 0 is in no convex combination of such g and a; the hull of them all
+//! lies in an open half space and a direction v increases every `F_s` near x. A partition of
+//! unity joins such directions to one smooth field v transversal to all the sets `F_s = 0`, which
+//! are therefore graphs over each other along v and form an isotopy from `f = 0` to `L = 0`; it
+//! stays off the sides of the box since none of the `F_s` vanishes there. Node values may be any
+//! numbers of the right sign in pruned cells, so rounding of f does no harm, and an exact zero
+//! stands for a small positive number. Sliding the corners of `L = 0` along their edges to the
+//! roots of f keeps every piece in its tetrahedron. Merging short edges keeps the topological
+//! type by the link condition.
+//!
+//! Otherwise (kinks, fields without intervals, the depth limit) two grids of n >= 32 and 2 n cells
+//! that agree in the Euler characteristic and the volume of every component give
+//! [`TopologyProof::Observed`], which proves nothing: what falls between the nodes of both is
+//! missed.
+
+mod box_sides;
+mod bulk;
+mod certificate;
+mod complex;
+mod crossing;
+pub mod error;
+mod grid;
+mod key_map;
+mod marching;
+mod observation;
+pub mod params;
+mod proof;
+mod resolution;
+mod short_edges;
+mod singular;
+mod surface_cells;
+#[cfg(test)]
+mod tests;
+
+pub use error::{PolygonizeError, Side};
+pub use params::PolygonizeParams;
+
+use complex::Complex;
+use isospline_artifact::kinds::{Mesh, TopologyProof};
+use isospline_geometry::TriangleMesh;
+use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
+use marching::Pieces;
+
+/// Stage polygonize.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polygonize {
+    params: PolygonizeParams,
+}
+
+impl Stage for Polygonize {
+    const NAME: &'static str = "polygonize";
+    const VERSION: u32 = 1;
+    type Params = PolygonizeParams;
+    type Whole<'a> = ();
+    type Rows<'a> = ();
+    type Output = Mesh;
+    type Error = PolygonizeError;
+
+    fn prepare(
+        _: &Ctx<'_>,
+        params: &Self::Params,
+        (): Self::Whole<'_>,
+    ) -> Result<Self, Self::Error> {
+        Ok(Self { params: params.clone() })
+    }
+
+    fn plan(&self, (): Self::Whole<'_>, _: usize) -> Plan {
+        Plan::Whole
+    }
+
+    fn process(
+        &self,
+        ctx: &Ctx<'_>,
+        (): Self::Whole<'_>,
+        (): Self::Rows<'_>,
+        _: &Task,
+    ) -> Result<Piece<Mesh>, PolygonizeError> {
+        let mut counters = Counters::default();
+        let (mesh, proof) = polygonize(ctx, &self.params, &mut counters)?;
+        let rows = Mesh::from_triangles(&mesh, proof)
+            .expect("invariant: merging keeps a manifold manifold");
+        counters.count("triangles", rows.face.len() as u64);
+        Ok(Piece { rows, counters })
+    }
+}
+
+/// The mesh and how its topology is known.
+///
+/// # Errors
+/// All of [`PolygonizeError`].
+fn polygonize(
+    ctx: &Ctx<'_>,
+    params: &PolygonizeParams,
+    counters: &mut Counters,
+) -> Result<(TriangleMesh, TopologyProof), PolygonizeError> {
+    let grid = resolution::choose(ctx, params)?;
+    ctx.host.progress(0, 1)?;
+    let cells = surface_cells::surface_cells(ctx, &grid, params.max_cells)?;
+    let sides_are_clear = box_sides::are_clear(ctx, &grid, &cells)?;
+    let mut complex = Complex::new(ctx, grid.clone(), &cells)?;
+    counters.count("cells", complex.n_cells() as u64);
+    counters.max("cells_a_side", f64::from(grid.longest()));
+    let proof = if sides_are_clear && proof::prove(ctx, &mut complex, params, counters)? {
+        TopologyProof::Certified
+    } else {
+        complex = observation::observe(ctx, &grid, params)?;
+        TopologyProof::Observed
+    };
+    let mesh = extract(ctx, &complex)?;
+    ctx.host.progress(1, 1)?;
+    Ok((mesh, proof))
+}
+
+fn extract(ctx: &Ctx<'_>, complex: &Complex) -> Result<TriangleMesh, PolygonizeError> {
+    let pieces = Pieces::of(complex);
+    if pieces.crossings.is_empty() {
+        return Err(resolution::empty_level_set(ctx));
+    }
+    box_sides::no_crossing_on_sides(ctx, complex, &pieces.crossings)?;
+    let step = complex.grid.lattice_step();
+    let side = |&[a, b]: &[u32; 2]| step * f64::from(complex.extent(a, b));
+    let sides: Vec<_> = pieces.crossings.iter().map(side).collect();
+    let mesh = pieces.triangulate(crossing::positions(ctx, complex, &pieces.crossings));
+    Ok(short_edges::merge(mesh, &sides, ctx.field))
+}

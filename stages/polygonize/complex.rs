@@ -1,0 +1,324 @@
+//! The tetrahedra about the surface: Kuhn's subdivision of the cells, bisected where need be.
+//!
+//! A cell is cut into six tetrahedra about its main diagonal [Kuhn], the same way in every cell,
+//! so neighbours agree on their common face. A tetrahedron is refined by halving its longest edge
+//! together with all others that share it [Maubach]; the longest edge is unique in each of the
+//! three shapes that arise, so the rule needs no history, and three halvings give the first shape
+//! at half the size. Only cells that the surface may touch are there.
+
+use crate::PolygonizeError;
+use crate::bulk;
+use crate::grid::{Grid, Site, pack, unpack};
+use crate::key_map::{KeyMap, pair};
+use isospline_geometry::Vec3;
+use isospline_stage::Ctx;
+
+/// Four nodes, positively oriented.
+pub(crate) type Tetrahedron = [u32; 4];
+
+/// Kuhn's six tetrahedra in a cell whose corner `x + 2 y + 4 z` is the one at offset (x, y, z).
+const KUHN: [Tetrahedron; 6] =
+    [[0, 1, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 5, 1, 7], [0, 3, 2, 7], [0, 6, 4, 7]];
+
+/// A cell that the surface may touch.
+#[derive(Clone, Debug)]
+struct Cell {
+    corners: [u32; 8],
+    /// Its tetrahedra once it is refined; none while Kuhn's six stand.
+    refined: Vec<Leaf>,
+}
+
+/// A tetrahedron of a refined cell.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    nodes: Tetrahedron,
+    /// Whether the present call of [`Complex::refine`] made it.
+    is_new: bool,
+}
+
+/// Tetrahedra with field values at their nodes.
+#[derive(Clone, Debug)]
+pub(crate) struct Complex {
+    /// The grid of the cells.
+    pub(crate) grid: Grid,
+    cells: Vec<Cell>,
+    cell_at: KeyMap,
+    sites: Vec<u64>,
+    values: Vec<f64>,
+    node_at: KeyMap,
+    halved: KeyMap,
+    queue: Vec<u32>,
+    queued: Vec<bool>,
+    touched: Vec<u32>,
+}
+
+impl Complex {
+    /// The complex of `cells`, with values.
+    ///
+    /// # Errors
+    /// [`PolygonizeError::NotANumber`] if the field has no value at a node.
+    pub(crate) fn new(ctx: &Ctx<'_>, grid: Grid, cells: &[Site]) -> Result<Self, PolygonizeError> {
+        let mut complex = Self {
+            grid,
+            cells: Vec::with_capacity(cells.len()),
+            cell_at: KeyMap::with_room_for(cells.len()),
+            sites: Vec::new(),
+            values: Vec::new(),
+            node_at: KeyMap::with_room_for(2 * cells.len()),
+            halved: KeyMap::with_room_for(0),
+            queue: Vec::new(),
+            queued: vec![false; cells.len()],
+            touched: Vec::new(),
+        };
+        for (row, &cell) in (0u32..).zip(cells) {
+            let corner = |i: u32| [cell[0] + (i & 1), cell[1] + (i >> 1 & 1), cell[2] + (i >> 2)];
+            let corners = std::array::from_fn(|i| complex.node(corner(i as u32)));
+            complex.cell_at.get_or_insert(pack(cell), row);
+            complex.cells.push(Cell { corners, refined: Vec::new() });
+        }
+        complex.evaluate(ctx)?;
+        Ok(complex)
+    }
+
+    /// Cells that the surface may touch.
+    pub(crate) fn n_cells(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// All tetrahedra of a cell.
+    pub(crate) fn tetrahedra(&self, cell: usize) -> impl Iterator<Item = Tetrahedron> + '_ {
+        let Cell { corners, refined } = &self.cells[cell];
+        let kuhn = if refined.is_empty() { &KUHN[..] } else { &[] };
+        kuhn.iter().map(|t| t.map(|i| corners[i as usize])).chain(refined.iter().map(|t| t.nodes))
+    }
+
+    /// Lattice corners of a cell's box.
+    pub(crate) fn cell_box(&self, cell: usize) -> (Site, Site) {
+        let corners = &self.cells[cell].corners;
+        (self.site(corners[0]), self.site(corners[7]))
+    }
+
+    /// Whether all corners of an unrefined cell lie on one side: it has no piece of the mesh.
+    pub(crate) fn is_one_sided(&self, cell: usize) -> bool {
+        let Cell { corners, refined } = &self.cells[cell];
+        refined.is_empty() && corners.iter().all(|&n| self.inside(n) == self.inside(corners[0]))
+    }
+
+    /// Lattice point of a node.
+    pub(crate) fn site(&self, node: u32) -> Site {
+        unpack(self.sites[node as usize])
+    }
+
+    /// Position of a node.
+    pub(crate) fn point(&self, node: u32) -> Vec3 {
+        self.grid.point(self.site(node))
+    }
+
+    /// Field value at a node.
+    pub(crate) fn value(&self, node: u32) -> f64 {
+        self.values[node as usize]
+    }
+
+    /// The side of a node; exact zeros count as outside, everywhere alike.
+    pub(crate) fn inside(&self, node: u32) -> bool {
+        self.values[node as usize] < 0.0
+    }
+
+    /// Median size of f at the nodes of the cells: its size about a cell away from the surface.
+    pub(crate) fn typical_value(&self) -> f64 {
+        let mut sizes: Vec<f64> = self.values.iter().map(|f| f.abs()).collect();
+        let middle = sizes.len() / 2;
+        if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    }
+
+    /// Length of the box around an edge in lattice steps.
+    pub(crate) fn extent(&self, a: u32, b: u32) -> u32 {
+        let (a, b) = (self.site(a), self.site(b));
+        (0..3).map(|k| a[k].abs_diff(b[k])).max().expect("invariant: three axes")
+    }
+
+    /// The longest edge of a tetrahedron, as places of its ends.
+    pub(crate) fn longest_edge(&self, t: &Tetrahedron) -> (usize, usize) {
+        let length_sq = |&(i, j): &(usize, usize)| {
+            let (a, b) = (self.site(t[i]), self.site(t[j]));
+            (0..3).map(|k| u64::from(a[k].abs_diff(b[k])).pow(2)).sum::<u64>()
+        };
+        EDGES.into_iter().max_by_key(length_sq).expect("invariant: six edges")
+    }
+
+    /// Halves the longest edge of each of `tetrahedra` and whatever that entails, so that the
+    /// tetrahedra stay conforming; returns the tetrahedra that are new.
+    ///
+    /// # Errors
+    /// [`PolygonizeError::NotANumber`] if the field has no value at a new node.
+    pub(crate) fn refine(
+        &mut self,
+        ctx: &Ctx<'_>,
+        tetrahedra: &[Tetrahedron],
+    ) -> Result<Vec<Tetrahedron>, PolygonizeError> {
+        for t in tetrahedra {
+            let (i, j) = self.longest_edge(t);
+            self.halve(t[i], t[j]);
+        }
+        while let Some(cell) = self.queue.pop() {
+            self.queued[cell as usize] = false;
+            self.bisect_cell(cell as usize);
+        }
+        self.evaluate(ctx)?;
+        Ok(self.take_new())
+    }
+
+    /// The tetrahedra made since the last call, cell by cell.
+    fn take_new(&mut self) -> Vec<Tetrahedron> {
+        let mut touched = std::mem::take(&mut self.touched);
+        touched.sort_unstable();
+        touched.dedup();
+        let mut new = Vec::new();
+        for cell in touched {
+            for leaf in &mut self.cells[cell as usize].refined {
+                if std::mem::take(&mut leaf.is_new) {
+                    new.push(leaf.nodes);
+                }
+            }
+        }
+        new
+    }
+
+    /// Bisects the tetrahedra of a cell until none of them has an edge that is halved now.
+    fn bisect_cell(&mut self, cell: usize) {
+        let mut stack = std::mem::take(&mut self.cells[cell].refined);
+        if stack.is_empty() {
+            stack.extend(self.tetrahedra(cell).map(|nodes| Leaf { nodes, is_new: false }));
+        }
+        stack.reverse();
+        let mut done = Vec::with_capacity(stack.len() + 6);
+        while let Some(leaf) = stack.pop() {
+            if !self.has_halved_edge(&leaf.nodes) {
+                done.push(leaf);
+                continue;
+            }
+            let (i, j) = self.longest_edge(&leaf.nodes);
+            let middle = self.halve(leaf.nodes[i], leaf.nodes[j]);
+            for end in [j, i] {
+                let mut child = Leaf { is_new: true, ..leaf };
+                child.nodes[end] = middle;
+                stack.push(child);
+            }
+        }
+        // A cell that was only looked at keeps Kuhn's six unstored.
+        if done.len() > 6 || done.iter().any(|leaf| leaf.is_new) {
+            self.cells[cell].refined = done;
+            self.touched.push(cell as u32);
+        }
+    }
+
+    fn has_halved_edge(&self, t: &Tetrahedron) -> bool {
+        EDGES.iter().any(|&(i, j)| self.halved.get(pair(t[i], t[j])).is_some())
+    }
+
+    /// The node in the middle of an edge; if the edge was whole, all cells there are queued.
+    fn halve(&mut self, a: u32, b: u32) -> u32 {
+        if let Some(middle) = self.halved.get(pair(a, b)) {
+            return middle;
+        }
+        let (at_a, at_b) = (self.site(a), self.site(b));
+        let at = [0, 1, 2].map(|k| u32::midpoint(at_a[k], at_b[k]));
+        let middle = self.lattice_node(at);
+        self.halved.get_or_insert(pair(a, b), middle);
+        self.queue_cells_at(at);
+        middle
+    }
+
+    fn queue_cells_at(&mut self, at: Site) {
+        let scale = self.grid.scale();
+        // On a cell border the lower neighbour has the point too.
+        let lower = at.map(|c| if c % scale == 0 && c > 0 { 1 } else { 0 });
+        for i in 0..8u32 {
+            let back = [i & 1, i >> 1 & 1, i >> 2];
+            if (0..3).any(|k| back[k] > lower[k]) {
+                continue;
+            }
+            let cell = [0, 1, 2].map(|k| at[k] / scale - back[k]);
+            if let Some(row) = self.cell_at.get(pack(cell))
+                && !self.queued[row as usize]
+            {
+                self.queued[row as usize] = true;
+                self.queue.push(row);
+            }
+        }
+    }
+
+    fn node(&mut self, grid_node: Site) -> u32 {
+        self.lattice_node(grid_node.map(|c| c << self.grid.levels))
+    }
+
+    fn lattice_node(&mut self, at: Site) -> u32 {
+        let key = pack(at);
+        let (node, is_new) = self.node_at.get_or_insert(key, self.sites.len() as u32);
+        if is_new {
+            self.sites.push(key);
+        }
+        node
+    }
+
+    /// Gives values to the nodes that have none yet.
+    fn evaluate(&mut self, ctx: &Ctx<'_>) -> Result<(), PolygonizeError> {
+        let new = &self.sites[self.values.len()..];
+        let found = bulk::shares(ctx.host, new, |sites| {
+            let points: Vec<_> = sites.iter().map(|&s| self.grid.point(unpack(s))).collect();
+            bulk::values(ctx.field, &points)
+        });
+        if let Some(i) = found.iter().position(|f| f.is_nan()) {
+            return Err(PolygonizeError::NotANumber { at: self.grid.point(unpack(new[i])) });
+        }
+        self.values.extend(found);
+        Ok(())
+    }
+}
+
+/// The edges of a tetrahedron, as places of their ends.
+pub(crate) const EDGES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use isospline_geometry::Aabb;
+    use isospline_implicit::ClosureField;
+    use isospline_stage::Serial;
+    use std::collections::BTreeMap;
+
+    fn volume(complex: &Complex, t: &Tetrahedron) -> f64 {
+        let [a, b, c, d] = t.map(|n| complex.point(n));
+        (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
+    }
+
+    #[test]
+    fn refined_tetrahedra_stay_positive_conforming_and_fill_the_box() {
+        let domain = Aabb::new(Vec3::zeros(), Vec3::new(2.0, 2.0, 2.0));
+        let field = ClosureField::new(1.0, |p: Vec3| p.x);
+        let ctx = Ctx { field: &field, domain, host: &Serial };
+        let cells: Vec<Site> = (0..8).map(|i| [i & 1, i >> 1 & 1, i >> 2]).collect();
+        let mut complex = Complex::new(&ctx, Grid::new(domain, 2, 6), &cells).unwrap();
+        for round in 0..9 {
+            let some = complex.tetrahedra(round % 3).nth(round).unwrap();
+            complex.refine(&ctx, &[some]).unwrap();
+        }
+        let all: Vec<_> = (0..8).flat_map(|c| complex.tetrahedra(c)).collect();
+        assert!(all.len() > 100, "{}", all.len());
+        assert!(all.iter().all(|t| volume(&complex, t) > 0.0));
+        assert!((all.iter().map(|t| volume(&complex, t)).sum::<f64>() - 8.0).abs() < 1e-12);
+        let mut faces = BTreeMap::new();
+        for t in &all {
+            for skip in 0..4 {
+                let mut face: Vec<u32> = (0..4).filter(|&i| i != skip).map(|i| t[i]).collect();
+                face.sort_unstable();
+                *faces.entry(face).or_insert(0) += 1;
+            }
+        }
+        for (face, uses) in faces {
+            let on_side = |k: usize, c: u32| face.iter().all(|&n| complex.site(n)[k] == c);
+            let outer = (0..3).any(|k| on_side(k, 0) || on_side(k, complex.grid.end(k)));
+            assert_eq!(uses, if outer { 1 } else { 2 });
+        }
+    }
+}
