@@ -146,3 +146,113 @@ fn parts(file: &[u8]) -> Result<(Header, Layout, Footer), Damage> {
 fn part<'a>(file: &'a [u8], range: &Range<u64>) -> &'a [u8] {
     &file[range.start as usize..range.end as usize]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::writer::tests::{counting, identity, stored, write};
+    use crate::{MemoryStore, Store};
+
+    fn damage(file: &[u8]) -> Option<Damage> {
+        let store = MemoryStore::new();
+        store.put("a.isos", file);
+        match (&store as &dyn Store).open("a.isos") {
+            Ok(_) => None,
+            Err(StoreError::Damaged { file, damage }) => {
+                assert_eq!(file, "a.isos");
+                Some(damage)
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    /// What must be said of a changed byte at `offset`.
+    fn expected(layout: &Layout, header: &Header, offset: u64) -> Damage {
+        if let Some((k, range)) = (0..).zip(&layout.sections).find(|(_, r)| r.contains(&offset)) {
+            let section: &SectionEntry = &header.sections[k];
+            let row = (offset - range.start) / u64::from(section.stride);
+            let block = row / u64::from(section.block_rows);
+            let Range { start: first, end } = section.block(block);
+            return Damage::Rows { section: section.name.clone(), block, first, end };
+        }
+        let paddings = layout.paddings(header);
+        if let Some((after, _)) = paddings.into_iter().find(|(_, r)| r.contains(&offset)) {
+            return Damage::Padding { after: after.to_owned() };
+        }
+        match offset {
+            0..8 => Damage::Foreign,
+            o if o < layout.header => Damage::Header,
+            o if layout.table.contains(&o) => Damage::Table,
+            _ => Damage::Footer,
+        }
+    }
+
+    #[test]
+    fn every_changed_byte_is_found_and_its_place_named() {
+        let (container, file) = stored(&counting(5));
+        for offset in 0..file.len() {
+            for change in [0x01, 0x80, 0xff, 0x55, 0x10] {
+                let mut changed = file.clone();
+                changed[offset] ^= change;
+                let found = damage(&changed).expect("the change is found");
+                let expected = expected(&container.layout, &container.header, offset as u64);
+                match found {
+                    Damage::Version { found, reads: 1 } if (8..12).contains(&offset) => {
+                        assert_ne!(found, 1);
+                    }
+                    // A changed length of the header may point beyond the end of the file.
+                    Damage::Truncated { .. } if (12..16).contains(&offset) => {}
+                    found => assert_eq!(found, expected, "byte {offset} ^ {change:#x}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_truncation_and_every_tail_is_found() {
+        let (_, file) = stored(&counting(5));
+        for length in 0..file.len() {
+            let found = damage(&file[..length]).expect("the truncation is found");
+            assert!(matches!(found, Damage::Truncated { .. }), "{length}: {found}");
+        }
+        for extra in [1, 8, 64, 4096] {
+            let longer = [&file[..], &vec![0; extra]].concat();
+            assert_eq!(damage(&longer), Some(Damage::Trailing { extra: extra as u64 }));
+        }
+        assert_eq!(damage(&file), None);
+    }
+
+    #[test]
+    fn a_damaged_row_names_its_block() {
+        let (container, mut file) = stored(&counting(10_000));
+        let start = container.layout.sections[0].start as usize;
+        file[start + 24 * 9_000] ^= 4;
+        let block_rows = u64::from(container.header.sections[0].block_rows);
+        assert_eq!(block_rows, 2730);
+        let expected = Damage::Rows { section: "twist".into(), block: 3, first: 8190, end: 10_000 };
+        assert_eq!(damage(&file), Some(expected));
+    }
+
+    #[test]
+    fn a_footer_of_another_file_is_refused() {
+        let (_, first) = stored(&counting(5));
+        let store = MemoryStore::new();
+        let other = crate::Identity { stage: "mako".to_owned(), ..identity() };
+        write(&store, "b", &other, &counting(5)).publish().unwrap();
+        let second = store.read("b").unwrap().unwrap().bytes().to_vec();
+        let tail = first.len() - FOOTER;
+        let spliced = [&second[..tail], &first[tail..]].concat();
+        assert_eq!(damage(&spliced), Some(Damage::Footer));
+    }
+
+    #[test]
+    fn other_files_and_other_versions_are_refused_by_name() {
+        assert_eq!(damage(b"%PDF-1.7 and so on"), Some(Damage::Foreign));
+        assert_eq!(damage(b""), Some(Damage::Truncated { found: 0, expected: 24 }));
+        let (container, mut file) = stored(&counting(1));
+        file[8] = 9;
+        assert_eq!(damage(&file), Some(Damage::Version { found: 9, reads: 1 }));
+        let text = container.view::<crate::kinds::Mesh>().unwrap_err().to_string();
+        assert_eq!(text, "a.isos: holds \"vertex_systems\" schema 1, expected \"mesh\" schema 1");
+    }
+}

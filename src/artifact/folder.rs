@@ -250,3 +250,122 @@ fn set_aside(file: &File, length: u64) -> std::io::Result<()> {
     }
     file.set_len(length)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MemoryStore;
+    use crate::kinds::VertexSystems;
+    use crate::writer::tests::{counting, identity, stored, write};
+
+    fn folder() -> (tempfile::TempDir, FolderStore) {
+        let folder = tempfile::tempdir().unwrap();
+        let store = FolderStore::new(folder.path().join("a model"), Durability::Durable);
+        drop(store.lock().unwrap());
+        (folder, store)
+    }
+
+    fn files(store: &FolderStore) -> Vec<String> {
+        let entries = std::fs::read_dir(store.folder()).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn folder_and_memory_hold_the_same_bytes() {
+        let (_folder, store) = folder();
+        let rows = counting(100);
+        let sealed = write(&store, "a.isos", &identity(), &rows);
+        assert!(store.names().unwrap().is_empty(), "not visible before it is published");
+        sealed.publish().unwrap();
+        store.sync_names().unwrap();
+        let found = store.read("a.isos").unwrap().unwrap();
+        assert_eq!(found.bytes(), stored(&rows).1);
+        assert_eq!(store.names().unwrap(), ["a.isos"]);
+        assert_eq!(files(&store), [".lock", "a.isos"]);
+    }
+
+    #[test]
+    fn a_writer_that_is_dropped_leaves_nothing() {
+        let (_folder, store) = folder();
+        drop(write(&store, "a.isos", &identity(), &counting(3)));
+        assert_eq!(files(&store), [".lock"]);
+    }
+
+    #[test]
+    fn a_partial_file_of_a_killed_run_is_not_taken_for_whole() {
+        let (_folder, store) = folder();
+        let killed = write(&store, "a.isos", &identity(), &counting(3));
+        std::mem::forget(killed);
+        assert_eq!(files(&store), [".lock", "a.isos.partial"]);
+        assert!(store.names().unwrap().is_empty());
+        assert!((&store as &dyn Store).peek("a.isos").unwrap().is_none());
+        write(&store, "a.isos", &identity(), &counting(9)).publish().unwrap();
+        assert_eq!(files(&store), [".lock", "a.isos"]);
+        let container = (&store as &dyn Store).open("a.isos").unwrap();
+        assert_eq!(container.view::<VertexSystems>().unwrap().twist.len(), 9);
+    }
+
+    #[test]
+    fn readers_keep_the_file_that_a_new_one_replaces() {
+        let (_folder, store) = folder();
+        write(&store, "a.isos", &identity(), &counting(3)).publish().unwrap();
+        let old = (&store as &dyn Store).open("a.isos").unwrap();
+        write(&store, "a.isos", &identity(), &counting(9)).publish().unwrap();
+        old.verify().unwrap();
+        assert_eq!(old.view::<VertexSystems>().unwrap().twist.len(), 3);
+    }
+
+    #[test]
+    fn a_store_has_one_owner_at_a_time() {
+        let (_folder, store) = folder();
+        let memory = MemoryStore::new();
+        for store in [&store as &dyn Store, &memory] {
+            let held = store.lock().unwrap();
+            let second = store.lock().unwrap_err();
+            assert!(matches!(second, StoreError::Locked { .. }), "{second}");
+            drop(held);
+            store.lock().unwrap();
+        }
+    }
+
+    #[test]
+    fn notes_are_replaced_as_a_whole() {
+        let (_folder, store) = folder();
+        let memory = MemoryStore::new();
+        for store in [&store as &dyn Store, &memory] {
+            assert_eq!(store.read_note("a.json").unwrap(), None);
+            store.write_note("a.json", b"long text").unwrap();
+            store.write_note("a.json", b"text").unwrap();
+            assert_eq!(store.read_note("a.json").unwrap().unwrap(), b"text");
+            store.remove("a.json").unwrap();
+            store.remove("a.json").unwrap();
+            assert_eq!(store.read_note("a.json").unwrap(), None);
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_file_is_an_error_with_its_path() {
+        let (_folder, store) = folder();
+        std::fs::create_dir(store.path("a.isos")).unwrap();
+        let failed = (&store as &dyn Store).open("a.isos").unwrap_err();
+        assert!(failed.to_string().contains("a.isos"), "{failed}");
+        let sealed = write(&store, "a.isos", &identity(), &counting(3));
+        let failed = sealed.publish().unwrap_err();
+        assert!(failed.to_string().contains("cannot rename"), "{failed}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn space_is_set_aside_before_the_first_row() {
+        use std::os::unix::fs::MetadataExt;
+        let (_folder, store) = folder();
+        let partial = store.create("big.isos", 1 << 20).unwrap();
+        let metadata = std::fs::metadata(store.path("big.isos.partial")).unwrap();
+        assert_eq!(metadata.len(), 1 << 20);
+        assert!(512 * metadata.blocks() >= 1 << 20, "{} blocks", metadata.blocks());
+        drop(partial);
+    }
+}

@@ -179,7 +179,7 @@ macro_rules! artifact {
 
         impl $view<'_> {
             /// Copies all rows.
-            pub fn to_owned_rows(&self) -> $owned {
+            pub fn to_owned_rows(self) -> $owned {
                 $owned { $( $field: self.$field.to_vec(), )* }
             }
         }

@@ -159,3 +159,119 @@ fn hash_rows(header: &Header, layout: &Layout, file: &[u8]) -> (Key, Vec<u8>) {
     let checksums = sections.flat_map(|(k, s)| block_checksums(s, rows(k)));
     (content, checksums.flat_map(u64::to_le_bytes).collect())
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::kinds::VertexSystems as Rows;
+    use crate::{Artifact, MemoryStore, SectionSource};
+
+    /// `n` rows of 24 bytes, none of the second section and `n + 2` of one byte.
+    pub(crate) fn counting(n: usize) -> Rows {
+        let twist = (0..n).map(|i| [i as f64, 0.5, -1.0]).collect();
+        let status = (0..n + 2).map(|i| i as u8).collect();
+        Rows { twist, weights: Vec::new(), status }
+    }
+
+    pub(crate) fn identity() -> Identity {
+        Identity {
+            kind: Rows::KIND,
+            schema: Rows::SCHEMA,
+            stage: "make".to_owned(),
+            stage_version: 1,
+            recipe: Key([1; 32]),
+            derivation: Key([2; 32]),
+        }
+    }
+
+    pub(crate) fn write(store: &dyn Store, name: &str, identity: &Identity, rows: &Rows) -> Sealed {
+        let lengths = [rows.twist.len(), rows.weights.len(), rows.status.len()];
+        let mut writer = Writer::begin(store, name, identity, Rows::SECTIONS, &lengths).unwrap();
+        for (k, section) in rows.sections().into_iter().enumerate() {
+            writer.write_rows(k, 0, section.bytes).unwrap();
+        }
+        writer.seal().unwrap()
+    }
+
+    /// The artifact as the writer gives it, and its bytes.
+    pub(crate) fn stored(rows: &Rows) -> (Arc<Container>, Vec<u8>) {
+        let store = MemoryStore::new();
+        let sealed = write(&store, "a.isos", &identity(), rows);
+        let container = Arc::clone(&sealed.container);
+        sealed.publish().unwrap();
+        let bytes = store.read("a.isos").unwrap().unwrap();
+        (container, bytes.bytes().to_vec())
+    }
+
+    #[test]
+    fn pieces_in_any_order_give_the_file_of_one_piece() {
+        let rows = counting(5);
+        let store = MemoryStore::new();
+        let mut writer =
+            Writer::begin(&store, "a.isos", &identity(), Rows::SECTIONS, &[5, 0, 7]).unwrap();
+        writer.write_rows(2, 3, &rows.status[3..]).unwrap();
+        writer.write_rows(0, 4, bytemuck::cast_slice(&rows.twist[4..])).unwrap();
+        writer.write_rows(2, 0, &rows.status[..3]).unwrap();
+        writer.write_rows(0, 0, bytemuck::cast_slice(&rows.twist[..4])).unwrap();
+        writer.seal().unwrap().publish().unwrap();
+        let bytes = store.read("a.isos").unwrap().unwrap();
+        assert_eq!(bytes.bytes(), stored(&rows).1);
+    }
+
+    #[test]
+    fn what_is_read_is_what_was_written() {
+        let rows = counting(300);
+        let (container, _) = stored(&rows);
+        container.verify().unwrap();
+        let view = container.view::<Rows>().unwrap();
+        assert_eq!(view.to_owned_rows(), rows);
+        let address = container.section("status").unwrap().bytes.as_ptr() as usize;
+        assert_eq!(address % 8, 0);
+        assert_eq!(container.header().sections[2].offset % 64, 0);
+    }
+
+    #[test]
+    fn empty_sections_are_whole() {
+        let rows = Rows::default();
+        let store = MemoryStore::new();
+        write(&store, "a.isos", &identity(), &rows).publish().unwrap();
+        let container = (&store as &dyn Store).open("a.isos").unwrap();
+        assert_eq!(container.view::<Rows>().unwrap().to_owned_rows(), rows);
+    }
+
+    #[test]
+    fn the_content_key_sees_rows_alone() {
+        let store = MemoryStore::new();
+        let other = Identity { recipe: Key([9; 32]), ..identity() };
+        let key = |identity: &Identity, rows: &Rows| {
+            write(&store, "a.isos", identity, rows).container.content()
+        };
+        let rows = counting(5);
+        assert_eq!(key(&identity(), &rows), key(&other, &rows));
+        assert_ne!(key(&identity(), &rows), key(&identity(), &counting(6)));
+        let named = Rows::SECTIONS.iter().map(|s| s.name).zip(rows.sections());
+        assert_eq!(key(&identity(), &rows), content_key(named));
+    }
+
+    #[test]
+    fn missing_and_misplaced_rows_are_refused() {
+        let store = MemoryStore::new();
+        let mut writer =
+            Writer::begin(&store, "a.isos", &identity(), Rows::SECTIONS, &[2, 0, 4]).unwrap();
+        let beyond = writer.write_rows(2, 3, &[0; 2]).unwrap_err();
+        assert_eq!(beyond.to_string(), "a.isos: rows 3.. (2 bytes) do not fit section \"status\"");
+        assert!(writer.write_rows(0, 0, &[0; 23]).is_err());
+        writer.write_rows(2, 0, &[0; 4]).unwrap();
+        let unfinished = writer.seal().unwrap_err();
+        assert_eq!(unfinished.to_string(), "a.isos: section \"twist\" has 0 of 2 rows");
+        assert!(store.names().unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_header_too_long_is_refused() {
+        let store = MemoryStore::new();
+        let long = Identity { stage: "x".repeat(5000), ..identity() };
+        let failed = Writer::begin(&store, "a", &long, Rows::SECTIONS, &[0, 0, 0]).unwrap_err();
+        assert!(matches!(failed, StoreError::HeaderSize { limit: 4096, .. }), "{failed}");
+    }
+}

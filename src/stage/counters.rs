@@ -58,6 +58,6 @@ mod tests {
         b.max("turn", 2.0);
         a.merge(&b);
         assert_eq!(a.repairs, BTreeMap::from([("split".to_owned(), 3)]));
-        assert_eq!(a.maxima["turn"], 3.0);
+        assert_eq!(a.maxima, BTreeMap::from([("turn".to_owned(), 3.0)]));
     }
 }
