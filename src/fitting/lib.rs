@@ -5,3 +5,4 @@ pub mod net;
 pub mod patch_fit;
 pub mod projection;
 pub mod shape;
+pub mod start;

@@ -4,7 +4,7 @@
 //! a small matrix product.
 
 use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, bernstein, exponents, grid, index, interior_indices,
+    DEGREE, N_CONTROL, N_INTERIOR, bernstein, grid, interior_indices,
 };
 use isospline_geometry::linear::{cholesky, cholesky_solve};
 use isospline_geometry::{Vec3, bezier_triangle};
@@ -90,95 +90,6 @@ fn combine(row: &[f64; N_CONTROL], net: &[Vec3; N_CONTROL]) -> Vec3 {
     sum
 }
 
-/// Fills the interior of a net from its boundary, as a start for projections.
-///
-/// Least squares of all third differences of the net: quadratic patches are reproduced, and
-/// large or strongly curved faces do not fold as they do over the flat triangle.
-#[derive(Clone, Debug)]
-pub struct Fill {
-    /// `[15][36]`, zero at interior columns.
-    weights: Vec<[f64; N_CONTROL]>,
-}
-
-impl Default for Fill {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Fill {
-    /// The constant matrix.
-    ///
-    /// # Panics
-    /// Never: the third differences determine the interior.
-    pub fn new() -> Self {
-        let interior = interior_indices();
-        let mut normal = [[0.0; N_INTERIOR]; N_INTERIOR];
-        let mut rhs = [[0.0; N_CONTROL]; N_INTERIOR];
-        for row in third_differences() {
-            for (i, &a) in interior.iter().enumerate() {
-                for (j, &b) in interior.iter().enumerate() {
-                    normal[i][j] += row[a] * row[b];
-                }
-                for c in (0..N_CONTROL).filter(|c| !interior.contains(c)) {
-                    rhs[i][c] -= row[a] * row[c];
-                }
-            }
-        }
-        let factor = cholesky(&normal).expect("invariant: third differences fix the interior");
-        cholesky_solve(&factor, &mut rhs);
-        Self { weights: rhs.to_vec() }
-    }
-
-    /// Overwrites the interior points of `net`.
-    pub fn fill(&self, net: &mut [Vec3; N_CONTROL]) {
-        let filled: Vec<Vec3> = self.weights.iter().map(|row| combine(row, net)).collect();
-        for (i, p) in interior_indices().into_iter().zip(filled) {
-            net[i] = p;
-        }
-    }
-}
-
-/// Rows of the third differences of a degree-7 net along and across its three directions.
-fn third_differences() -> Vec<[f64; N_CONTROL]> {
-    // Directions of barycentric steps; they sum to zero.
-    const STEPS: [[[usize; 3]; 2]; 3] =
-        [[[0, 1, 0], [1, 0, 0]], [[0, 0, 1], [0, 1, 0]], [[1, 0, 0], [0, 0, 1]]];
-    // All but the mixed one: pure differences alone leave the bubble `u v w` free.
-    let kinds = [
-        [0, 0, 0],
-        [1, 1, 1],
-        [2, 2, 2],
-        [0, 0, 1],
-        [1, 1, 2],
-        [2, 2, 0],
-        [0, 1, 1],
-        [1, 2, 2],
-        [2, 0, 0],
-    ];
-    let mut rows = Vec::new();
-    for base in exponents(DEGREE - 3) {
-        for kind in kinds {
-            let mut row = [0.0; N_CONTROL];
-            for choice in 0..8usize {
-                let mut e = base;
-                let mut sign = 1.0;
-                for (bit, &direction) in kind.iter().enumerate() {
-                    let back = (choice >> bit) & 1;
-                    let step = STEPS[direction][back];
-                    e = [e[0] + step[0], e[1] + step[1], e[2] + step[2]];
-                    if back == 1 {
-                        sign = -sign;
-                    }
-                }
-                row[index(e)] += sign;
-            }
-            rows.push(row);
-        }
-    }
-    rows
-}
-
 /// The fit of all interior points.
 pub fn interior_fit(steps: u32) -> PatchFit<N_INTERIOR> {
     PatchFit::new(steps, interior_indices())
@@ -194,40 +105,15 @@ pub fn innermost_fit(steps: u32) -> PatchFit<3> {
 mod tests {
     use super::*;
 
-    /// A net of degree 7 whose patch is a quadratic of the barycentrics.
-    fn quadratic_net() -> [Vec3; N_CONTROL] {
-        // The blossom of a quadratic, averaged over pairs: control points of the raised net.
-        let value = |e: [usize; 3]| {
-            let x = e.map(|k| k as f64);
-            let pair = |i: usize, j: usize| {
-                if i == j { x[i] * (x[i] - 1.0) / 42.0 } else { x[i] * x[j] / 42.0 }
-            };
-            Vec3::new(
-                x[0] / 7.0,
-                x[1] / 7.0,
-                3.0 * pair(0, 0) - 2.0 * pair(0, 1) + pair(2, 2) + 0.5 * pair(1, 2),
-            )
-        };
-        let net: Vec<Vec3> = exponents(DEGREE).map(value).collect();
+    fn wavy_net() -> [Vec3; N_CONTROL] {
+        let net: Vec<Vec3> =
+            grid(DEGREE).map(|[u, v, w]| Vec3::new(u, v, 3.0 * u * u - v * w * w)).collect();
         net.try_into().unwrap()
     }
 
     #[test]
-    fn filling_reproduces_quadratic_patches() {
-        let exact = quadratic_net();
-        let mut net = exact;
-        for i in interior_indices() {
-            net[i] = Vec3::new(9.0, 9.0, 9.0);
-        }
-        Fill::new().fill(&mut net);
-        for (a, b) in net.iter().zip(&exact) {
-            assert!((a - b).norm() < 1e-12, "{:e}", (a - b).norm());
-        }
-    }
-
-    #[test]
     fn fitting_recovers_a_net_from_its_own_samples() {
-        let exact = quadratic_net();
+        let exact = wavy_net();
         for steps in [MIN_GRID, 12, 20] {
             let fit = interior_fit(steps);
             let mut targets = vec![Vec3::zeros(); fit.n_samples()];

@@ -9,9 +9,10 @@ pub use params::FairingParams;
 use isospline_artifact::kinds::{
     BaseMeshView, EdgeSystemsView, NetworkView, PatchMeta, Patches, Scheme, VertexSystemsView,
 };
-use isospline_fitting::net::{boundary_net, flat_interior, needed_edges, point};
-use isospline_fitting::patch_fit::{Fill, PatchFit, innermost_fit};
+use isospline_fitting::net::{flat_interior, needed_edges, point};
+use isospline_fitting::patch_fit::{PatchFit, innermost_fit};
 use isospline_fitting::projection::project_all;
+use isospline_fitting::start::start_nets;
 use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, first_inner_index};
 use isospline_geometry::{HalfEdge, Vec3};
 use isospline_stage::plan::{Need, cut, ranges};
@@ -24,7 +25,6 @@ use std::ops::Range;
 #[derive(Clone, Debug)]
 pub struct Fairing {
     fit: PatchFit<3>,
-    fill: Fill,
 }
 
 impl Stage for Fairing {
@@ -41,7 +41,7 @@ impl Stage for Fairing {
         params: &FairingParams,
         _: (BaseMeshView<'_>,),
     ) -> Result<Self, FairingError> {
-        Ok(Self { fit: innermost_fit(params.grid), fill: Fill::new() })
+        Ok(Self { fit: innermost_fit(params.grid) })
     }
 
     fn plan(&self, (mesh,): (BaseMeshView<'_>,), rows_per_task: usize) -> Plan {
@@ -77,9 +77,8 @@ impl Stage for Fairing {
         let mut targets = vec![Vec3::zeros(); faces.len() * n_samples];
         let mut nets = Vec::with_capacity(faces.len());
         for (face, targets) in faces.zip(targets.chunks_exact_mut(n_samples)) {
-            let mut net = boundary_net(&mesh, &network, face);
-            self.fill.fill(&mut net);
-            self.fit.sample(&net, targets);
+            let (mut net, start) = start_nets(&mesh, &network, face);
+            self.fit.sample(&start, targets);
             place_inner_rows(&mesh, &vertices, &edges, face, &mut net);
             nets.push(net);
         }

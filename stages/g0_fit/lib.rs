@@ -7,9 +7,10 @@ pub use error::G0FitError;
 pub use params::G0FitParams;
 
 use isospline_artifact::kinds::{BaseMeshView, FaceFit, G0Fit, NetworkView};
-use isospline_fitting::net::{boundary_net, flat_interior, needed_edges};
-use isospline_fitting::patch_fit::{Fill, PatchFit, interior_fit};
+use isospline_fitting::net::{flat_interior, needed_edges};
+use isospline_fitting::patch_fit::{PatchFit, interior_fit};
 use isospline_fitting::projection::project_all;
+use isospline_fitting::start::start_nets;
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_triangle::{N_CONTROL, N_INTERIOR};
 use isospline_stage::plan::{Need, cut, ranges};
@@ -19,7 +20,6 @@ use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
 #[derive(Clone, Debug)]
 pub struct G0FitStage {
     fit: PatchFit<N_INTERIOR>,
-    fill: Fill,
 }
 
 impl Stage for G0FitStage {
@@ -36,7 +36,7 @@ impl Stage for G0FitStage {
         params: &G0FitParams,
         _: (BaseMeshView<'_>,),
     ) -> Result<Self, G0FitError> {
-        Ok(Self { fit: interior_fit(params.grid), fill: Fill::new() })
+        Ok(Self { fit: interior_fit(params.grid) })
     }
 
     fn plan(&self, (mesh,): (BaseMeshView<'_>,), rows_per_task: usize) -> Plan {
@@ -63,9 +63,8 @@ impl Stage for G0FitStage {
         let mut targets = vec![Vec3::zeros(); faces.len() * n_samples];
         let mut nets = Vec::with_capacity(faces.len());
         for (face, targets) in faces.zip(targets.chunks_exact_mut(n_samples)) {
-            let mut net = boundary_net(&mesh, &network, face);
-            self.fill.fill(&mut net);
-            self.fit.sample(&net, targets);
+            let (net, start) = start_nets(&mesh, &network, face);
+            self.fit.sample(&start, targets);
             nets.push(net);
         }
         let diagonal = mesh.bounds[0].diagonal;
