@@ -1,0 +1,92 @@
+//! A surface to export in tests: a bulged octahedron and, apart from it, a bulged ring.
+
+use isospline_artifact::kinds::{PatchMeta, Patches};
+use isospline_geometry::bezier_triangle::{DEGREE, grid, interior_indices};
+use isospline_geometry::{TriangleMesh, Vec3};
+
+/// Genus 0 and genus 1: Euler characteristic 2, two components, 8 + 60 faces.
+pub(crate) fn ball_and_ring() -> Patches {
+    let mut mesh = octahedron();
+    let ring = ring(6, 5);
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(ring.positions);
+    mesh.faces.extend(ring.faces.iter().map(|face| face.map(|v| v + first)));
+    bulged(&mesh)
+}
+
+/// Patches over the faces of a mesh whose control points all go through one polynomial map, so
+/// that no two agree by accident.
+fn bulged(mesh: &TriangleMesh) -> Patches {
+    let mut edges: Vec<[u32; 2]> = mesh
+        .faces
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .filter(|[a, b]| a < b)
+        .collect();
+    edges.sort_unstable();
+    let edge_of = |a: u32, b: u32| edges.binary_search(&[a.min(b), a.max(b)]).unwrap() as u32;
+    let at = |v: u32| mesh.positions[v as usize];
+    let curve = |&[a, b]: &[u32; 2]| {
+        flat([1.0, 2.0, 3.0].map(|k| bulge(at(a) + 0.25 * k * (at(b) - at(a)))))
+    };
+    let inner = |f: usize| {
+        let corners = mesh.corners(f as u32);
+        let net: Vec<Vec3> = grid(DEGREE)
+            .map(|[u, v, w]| bulge(u * corners[0] + v * corners[1] + w * corners[2]))
+            .collect();
+        flat(interior_indices().map(|i| net[i]))
+    };
+    Patches {
+        meta: vec![PatchMeta { scheme: 0, degree: 7, boundary_degree: 4, rational: 0 }],
+        position: mesh.positions.iter().map(|&p| bulge(p).into()).collect(),
+        face: mesh.faces.clone(),
+        edge_of: mesh
+            .faces
+            .iter()
+            .flat_map(|&[a, b, c]| [edge_of(a, b), edge_of(b, c), edge_of(c, a)])
+            .collect(),
+        boundary: edges.iter().map(curve).collect(),
+        interior: (0..mesh.faces.len()).map(inner).collect(),
+    }
+}
+
+fn bulge(p: Vec3) -> Vec3 {
+    p + 0.11 * Vec3::new(p.y * p.z, p.z * p.x - 0.3 * p.y * p.y, 0.2 * p.x * p.x * p.y)
+}
+
+fn flat<const N: usize, const M: usize>(points: [Vec3; N]) -> [f64; M] {
+    std::array::from_fn(|i| points[i / 3][i % 3])
+}
+
+fn octahedron() -> TriangleMesh {
+    let (x, y, z) = (Vec3::x(), Vec3::y(), Vec3::z());
+    TriangleMesh {
+        positions: vec![x, -x, y, -y, z, -z],
+        faces: vec![
+            [0, 2, 4],
+            [2, 1, 4],
+            [1, 3, 4],
+            [3, 0, 4],
+            [2, 0, 5],
+            [1, 2, 5],
+            [3, 1, 5],
+            [0, 3, 5],
+        ],
+    }
+}
+
+fn ring(n: usize, m: usize) -> TriangleMesh {
+    let turn = |k: usize, n: usize| std::f64::consts::TAU * k as f64 / n as f64;
+    let mut mesh = TriangleMesh::default();
+    for i in 0..n {
+        for j in 0..m {
+            let (phi, theta) = (turn(i, n), turn(j, m));
+            let radius = 4.0 + theta.cos();
+            mesh.positions.push(Vec3::new(radius * phi.cos(), radius * phi.sin(), theta.sin()));
+            let at = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
+            mesh.faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            mesh.faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    mesh
+}

@@ -1,0 +1,215 @@
+//! VTK unstructured grids: one cell of type 76, `VTK_BEZIER_TRIANGLE`, a face, exact.
+//!
+//! Points are merged: the vertices, six a raised edge, fifteen a face; so neighbouring cells share
+//! the points of their edge. Arrays follow the XML as raw bytes.
+
+use crate::ExportError;
+use isospline_artifact::kinds::PatchesView;
+use isospline_geometry::bezier_triangle::{
+    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, exponents, index, interior_indices,
+};
+use std::io::{self, Write};
+
+const VTK_BEZIER_TRIANGLE: u8 = 76;
+/// Raised control points of an edge between its ends.
+const N_EDGE: usize = DEGREE - 1;
+
+pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<(), ExportError> {
+    let (n_vertices, n_edges) = (patches.position.len(), patches.boundary.len());
+    let n_faces = patches.face.len();
+    let n_points = n_vertices + N_EDGE * n_edges + N_INTERIOR * n_faces;
+    let sizes = [24 * n_points, 8 * N_CONTROL * n_faces, 8 * n_faces, n_faces];
+    write_head(out, n_points, n_faces, sizes)?;
+    begin_array(out, sizes[0])?;
+    write_points(patches, out)?;
+    begin_array(out, sizes[1])?;
+    let order = vtk_order(DEGREE);
+    for f in 0..n_faces {
+        let numbers = point_numbers(patches, f);
+        for &q in &order {
+            out.write_all(&(numbers[q] as i64).to_le_bytes())?;
+        }
+    }
+    begin_array(out, sizes[2])?;
+    for f in 1..=n_faces {
+        out.write_all(&((N_CONTROL * f) as i64).to_le_bytes())?;
+    }
+    begin_array(out, sizes[3])?;
+    for _ in 0..n_faces {
+        out.write_all(&[VTK_BEZIER_TRIANGLE])?;
+    }
+    out.write_all(b"\n  </AppendedData>\n</VTKFile>\n")?;
+    Ok(())
+}
+
+fn write_head(
+    out: &mut dyn Write,
+    n_points: usize,
+    n_faces: usize,
+    sizes: [usize; 4],
+) -> io::Result<()> {
+    // Each array is preceded by its size in 8 bytes.
+    let offset = |k: usize| sizes[..k].iter().map(|n| n + 8).sum::<usize>();
+    let (points, connectivity, offsets, types) = (offset(0), offset(1), offset(2), offset(3));
+    let data = r#"format="appended" offset"#;
+    write!(
+        out,
+        r#"<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="2.2" byte_order="LittleEndian" header_type="UInt64">
+  <UnstructuredGrid>
+    <Piece NumberOfPoints="{n_points}" NumberOfCells="{n_faces}">
+      <Points>
+        <DataArray type="Float64" Name="Points" NumberOfComponents="3" {data}="{points}"/>
+      </Points>
+      <Cells>
+        <DataArray type="Int64" Name="connectivity" {data}="{connectivity}"/>
+        <DataArray type="Int64" Name="offsets" {data}="{offsets}"/>
+        <DataArray type="UInt8" Name="types" {data}="{types}"/>
+      </Cells>
+    </Piece>
+  </UnstructuredGrid>
+  <AppendedData encoding="raw">
+   _"#
+    )
+}
+
+fn begin_array(out: &mut dyn Write, size: usize) -> io::Result<()> {
+    out.write_all(&(size as u64).to_le_bytes())
+}
+
+/// Vertices, then the inner points of raised edges from the lower vertex, then those of faces.
+fn write_points(patches: &PatchesView<'_>, out: &mut dyn Write) -> io::Result<()> {
+    let mut put = |p: &[f64]| p.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
+    for p in patches.position {
+        put(p)?;
+    }
+    for half in halves_from_the_lower_vertex(patches) {
+        let net = patches.net(half / 3);
+        for s in 1..DEGREE {
+            put(net[boundary_index(DEGREE, half % 3, s)].as_slice())?;
+        }
+    }
+    for inner in patches.interior {
+        put(inner)?;
+    }
+    Ok(())
+}
+
+/// For each edge, a half-edge that runs from its lower to its higher vertex.
+fn halves_from_the_lower_vertex(patches: &PatchesView<'_>) -> Vec<usize> {
+    let mut out = vec![0; patches.boundary.len()];
+    for (half, &edge) in patches.edge_of.iter().enumerate() {
+        if runs_upward(patches, half) {
+            out[edge as usize] = half;
+        }
+    }
+    out
+}
+
+fn runs_upward(patches: &PatchesView<'_>, half: usize) -> bool {
+    let (face, corner) = (patches.face[half / 3], half % 3);
+    face[corner] < face[(corner + 1) % 3]
+}
+
+/// Numbers of the points of face `f`, in storage order.
+fn point_numbers(patches: &PatchesView<'_>, f: usize) -> [usize; N_CONTROL] {
+    let (n_vertices, n_edges) = (patches.position.len(), patches.boundary.len());
+    let mut numbers = [0; N_CONTROL];
+    for corner in 0..3 {
+        numbers[boundary_index(DEGREE, corner, 0)] = patches.face[f][corner] as usize;
+        let half = 3 * f + corner;
+        let first = n_vertices + N_EDGE * patches.edge_of[half] as usize;
+        for s in 1..DEGREE {
+            let step = if runs_upward(patches, half) { s } else { DEGREE - s };
+            numbers[boundary_index(DEGREE, corner, s)] = first + step - 1;
+        }
+    }
+    let first = n_vertices + N_EDGE * n_edges + N_INTERIOR * f;
+    for (slot, q) in interior_indices().into_iter().enumerate() {
+        numbers[q] = first + slot;
+    }
+    numbers
+}
+
+/// VTK's order of the points of a triangle, as storage indices: corners, inner points of the edges
+/// 0 to 1, 1 to 2 and 2 to 0, then the triangle inside by the same rule.
+fn vtk_order(degree: usize) -> Vec<usize> {
+    let mut out = Vec::with_capacity(N_CONTROL);
+    let mut ring = 0;
+    while degree >= 3 * ring {
+        // Each ring is the border of a triangle of degree `n` whose exponents start at `ring`.
+        let n = degree - 3 * ring;
+        let lift = |e: [usize; 3]| index(e.map(|x| x + ring));
+        if n == 0 {
+            out.push(lift([0; 3]));
+            break;
+        }
+        out.extend((0..3).map(|corner| lift(on_border(n, corner, 0))));
+        for corner in 0..3 {
+            out.extend((1..n).map(|s| lift(on_border(n, corner, s))));
+        }
+        ring += 1;
+    }
+    debug_assert_eq!(out.len(), exponents(degree).count());
+    out
+}
+
+/// Exponents `s` steps from `corner` towards the next one, degree `n`.
+fn on_border(n: usize, corner: usize, s: usize) -> [usize; 3] {
+    let mut e = [0; 3];
+    e[corner] = n - s;
+    e[(corner + 1) % 3] = s;
+    e
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample;
+    use isospline_geometry::Vec3;
+
+    #[test]
+    fn the_order_of_vtk_names_every_point_once() {
+        let mut order = vtk_order(7);
+        assert_eq!(order[..5], [0, 28, 35, index([6, 1, 0]), index([5, 2, 0])]);
+        assert_eq!(order[21..24], [[5, 1, 1], [1, 5, 1], [1, 1, 5]].map(index));
+        assert_eq!(order[33..], [[3, 2, 2], [2, 3, 2], [2, 2, 3]].map(index));
+        order.sort_unstable();
+        assert!(order.into_iter().eq(0..36));
+        assert_eq!(vtk_order(3).last(), Some(&index([1, 1, 1])));
+    }
+
+    #[test]
+    fn points_by_number_are_the_nets_in_all_bits() {
+        let patches = sample::ball_and_ring();
+        let view = patches.view();
+        let mut bytes = Vec::new();
+        write_points(&view, &mut bytes).unwrap();
+        let coordinates: Vec<f64> =
+            bytes.as_chunks::<8>().0.iter().map(|&b| f64::from_le_bytes(b)).collect();
+        for f in 0..view.face.len() {
+            for (number, p) in point_numbers(&view, f).into_iter().zip(view.net(f)) {
+                let found = Vec3::from_column_slice(&coordinates[3 * number..3 * number + 3]);
+                assert_eq!(found.map(f64::to_bits), p.map(f64::to_bits));
+            }
+        }
+    }
+
+    #[test]
+    fn arrays_stand_where_the_head_says() {
+        let patches = sample::ball_and_ring();
+        let mut bytes = Vec::new();
+        write(&patches.view(), &mut bytes).unwrap();
+        let start = bytes.windows(2).position(|w| w == b" _").unwrap() + 2;
+        let head = std::str::from_utf8(&bytes[..start]).unwrap();
+        let n_faces = patches.face.len() as u64;
+        let wanted = [n_faces * 36 * 8, n_faces * 8, n_faces];
+        for (name, size) in ["connectivity", "offsets", "types"].into_iter().zip(wanted) {
+            let tag = head.split_once(name).unwrap().1.split_once("offset=\"").unwrap().1;
+            let offset: usize = tag.split_once('"').unwrap().0.parse().unwrap();
+            let at = start + offset;
+            assert_eq!(bytes[at..at + 8], size.to_le_bytes(), "{name}");
+        }
+        assert!(bytes.ends_with(b"\x4c\n  </AppendedData>\n</VTKFile>\n"));
+    }
+}
