@@ -275,3 +275,6 @@ fn damaged(error: StoreError) -> Result<State, RunError> {
         other => Err(other.into()),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -188,3 +188,6 @@ fn reasons(
     }
     Ok(reasons)
 }
+
+#[cfg(test)]
+mod tests;

@@ -20,6 +20,8 @@ pub mod provenance;
 pub mod registry;
 pub mod report;
 mod tiling;
+#[cfg(test)]
+mod toys;
 mod workers;
 
 pub use driver::Pipeline;
