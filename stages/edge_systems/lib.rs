@@ -1,4 +1,4 @@
-//! Stage edge_systems: first inner rows that satisfy the G1 condition along every edge.
+//! Stage `edge_systems`: first inner rows that satisfy the G1 condition along every edge.
 
 mod edge;
 mod error;

@@ -2,10 +2,16 @@
 //!
 //! Rows k = 2, 3, 4 stay; row k = 5 is replaced by the alternating sum of all eight rows, divided
 //! by the small number `lambda1 - lambda0`:
-//! `15 (p2 - r2) - 20 (p3 - r3) + 15 (p4 - r4) + nu D4 q = -[(p0 - r0) - 6 (p1 - r1)
-//! - 6 (p5 - r5) + (p6 - r6)]`, `D4 q = q0 - 4 q1 + 6 q2 - 4 q3 + q4`, with
-//! `mu2 = (-mu0 + 4 mu1 + 4 mu3 - mu4) / 6 + (lambda1 - lambda0) nu / 6` and `nu` free. The
-//! condition stays near 8 for all lambdas; the printed system degenerates where they meet.
+//!
+//! ```text
+//! 15 (p2 - r2) - 20 (p3 - r3) + 15 (p4 - r4) + nu D4 q
+//!     = 6 (p1 - r1) + 6 (p5 - r5) - (p0 - r0) - (p6 - r6)
+//! D4 q = q0 - 4 q1 + 6 q2 - 4 q3 + q4
+//! mu2  = (-mu0 + 4 mu1 + 4 mu3 - mu4) / 6 + (lambda1 - lambda0) nu / 6
+//! ```
+//!
+//! with `nu` free. The condition stays near 8 for all lambdas; the printed system degenerates
+//! where they meet.
 //
 // symbols: A x + d nu = b for x = (p2, r2, p3, r3, p4, r4), one 4 by 6 matrix for the three axes
 

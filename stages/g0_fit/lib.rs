@@ -1,4 +1,4 @@
-//! Stage g0_fit: interior control points that follow the surface inside fixed boundary curves.
+//! Stage `g0_fit`: interior control points that follow the surface inside fixed boundary curves.
 
 mod error;
 mod params;

@@ -228,7 +228,7 @@ fn newton_lagrange(edge: &Edge, equations: &NormalEquations) -> (Option<Unknowns
         x = std::array::from_fn(|i| x[i] + step[i]);
         r = multipliers;
         if change < STEP_TOLERANCE {
-            return (Some(x), iteration);
+            return (Some(x), iteration + 1);
         }
     }
     (Some(x), MAX_ITERATIONS)

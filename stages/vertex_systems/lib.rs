@@ -1,4 +1,4 @@
-//! Stage vertex_systems: twist points that satisfy the G1 condition at every vertex.
+//! Stage `vertex_systems`: twist points that satisfy the G1 condition at every vertex.
 
 mod error;
 mod params;
