@@ -28,7 +28,7 @@ pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<()
         array_header(out, "<f8", &format!("({n_faces}, {N_CONTROL}, 3)"))?;
         for f in 0..n_faces {
             let net = patches.net(f);
-            write_floats(out, net.iter().flat_map(|p| p.as_slice()))?;
+            write_floats(out, net.iter().flatten())?;
         }
         Ok(())
     };
@@ -56,7 +56,7 @@ fn write_floats<'a>(out: &mut dyn Write, values: impl Iterator<Item = &'a f64>) 
 fn array_header(out: &mut dyn Write, dtype: &str, shape: &str) -> io::Result<()> {
     const PREFIX: usize = 10;
     let mut dict = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}");
-    while (PREFIX + dict.len() + 1) % 64 != 0 {
+    while !(PREFIX + dict.len() + 1).is_multiple_of(64) {
         dict.push(' ');
     }
     dict.push('\n');

@@ -1,13 +1,13 @@
-//! A surface to export in tests: a bulged octahedron and, apart from it, a bulged ring.
+//! A surface to export in tests: a ball of eight patches and, apart from it, a ring.
 
 use isospline_artifact::kinds::{PatchMeta, Patches};
 use isospline_geometry::bezier_triangle::{DEGREE, grid, interior_indices};
 use isospline_geometry::{TriangleMesh, Vec3};
 
-/// Genus 0 and genus 1: Euler characteristic 2, two components, 8 + 60 faces.
+/// Genus 0 and genus 1: Euler characteristic 2, two components, 8 + 192 faces.
 pub(crate) fn ball_and_ring() -> Patches {
     let mut mesh = octahedron();
-    let ring = ring(6, 5);
+    let ring = ring(12, 8);
     let first = mesh.positions.len() as u32;
     mesh.positions.extend(ring.positions);
     mesh.faces.extend(ring.faces.iter().map(|face| face.map(|v| v + first)));
@@ -24,7 +24,10 @@ fn bulged(mesh: &TriangleMesh) -> Patches {
         .filter(|[a, b]| a < b)
         .collect();
     edges.sort_unstable();
-    let edge_of = |a: u32, b: u32| edges.binary_search(&[a.min(b), a.max(b)]).unwrap() as u32;
+    let edge_of = |a: u32, b: u32| {
+        let row = edges.binary_search(&[a.min(b), a.max(b)]);
+        row.expect("invariant: a closed mesh has both directions of an edge") as u32
+    };
     let at = |v: u32| mesh.positions[v as usize];
     let curve = |&[a, b]: &[u32; 2]| {
         flat([1.0, 2.0, 3.0].map(|k| bulge(at(a) + 0.25 * k * (at(b) - at(a)))))
@@ -50,9 +53,20 @@ fn bulged(mesh: &TriangleMesh) -> Patches {
     }
 }
 
+/// Rounds what is flat, then shears it so that no symmetry hides an exchange of points.
 fn bulge(p: Vec3) -> Vec3 {
-    p + 0.11 * Vec3::new(p.y * p.z, p.z * p.x - 0.3 * p.y * p.y, 0.2 * p.x * p.x * p.y)
+    let p = if p.norm() < 2.0 { p.normalize() } else { rounded_ring(p) };
+    p + 0.03 * Vec3::new(p.y * p.z, p.z * p.x - 0.3 * p.y * p.y, 0.2 * p.x * p.x * p.y)
 }
+
+/// The nearest point of the torus that [`ring`] is inscribed in.
+fn rounded_ring(p: Vec3) -> Vec3 {
+    let radius = p.xy().norm();
+    let core = Vec3::new(p.x, p.y, 0.0) * (RING_RADIUS / radius);
+    core + (p - core).normalize()
+}
+
+const RING_RADIUS: f64 = 4.0;
 
 fn flat<const N: usize, const M: usize>(points: [Vec3; N]) -> [f64; M] {
     std::array::from_fn(|i| points[i / 3][i % 3])
@@ -81,7 +95,7 @@ fn ring(n: usize, m: usize) -> TriangleMesh {
     for i in 0..n {
         for j in 0..m {
             let (phi, theta) = (turn(i, n), turn(j, m));
-            let radius = 4.0 + theta.cos();
+            let radius = RING_RADIUS + theta.cos();
             mesh.positions.push(Vec3::new(radius * phi.cos(), radius * phi.sin(), theta.sin()));
             let at = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
             mesh.faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);

@@ -1,0 +1,76 @@
+"""Reads npz exports with numpy alone and evaluates their patches: the yardstick of the readers."""
+
+import pathlib
+import sys
+
+import numpy as np
+
+DEGREE = 7
+# Exponents (i, j, k) of the control points in storage order: i descends, then j.
+EXPONENTS = [(DEGREE - r, r - k, k) for r in range(DEGREE + 1) for k in range(r + 1)]
+FACTORIAL = [1, 1, 2, 6, 24, 120, 720, 5040]
+
+
+class Surface:
+    """The arrays of one npz export."""
+
+    def __init__(self, path):
+        self.path = path
+        with np.load(path) as arrays:
+            self.vertices = arrays["vertices"]
+            self.faces = arrays["faces"]
+            self.nets = arrays["control_points"]
+            self.degree = int(arrays["degree"])
+
+    def beside(self, extension):
+        """Path of the same surface in another format."""
+        return self.path.with_suffix("." + extension)
+
+    def half_edges(self):
+        """Maps each directed edge (a, b) to its (face, corner); fails if one occurs twice."""
+        found = {}
+        for f, face in enumerate(self.faces.tolist()):
+            for corner in range(3):
+                edge = (face[corner], face[(corner + 1) % 3])
+                check(edge not in found, f"edge {edge} runs twice in one direction")
+                found[edge] = (f, corner)
+        return found
+
+    def euler_characteristic(self):
+        """V - E + F of a closed surface, where E = 3F / 2."""
+        return len(self.vertices) - 3 * len(self.faces) // 2 + len(self.faces)
+
+
+def bernstein(points):
+    """Bernstein values (n, 36) of degree 7 at barycentric points (n, 3)."""
+    u, v, w = np.asarray(points, dtype=float).T
+    columns = []
+    for i, j, k in EXPONENTS:
+        multinomial = FACTORIAL[7] // (FACTORIAL[i] * FACTORIAL[j] * FACTORIAL[k])
+        columns.append(multinomial * u**i * v**j * w**k)
+    return np.stack(columns, axis=1)
+
+
+def boundary(corner):
+    """Storage indices of the control points from `corner` to the next one."""
+    out = []
+    for s in range(DEGREE + 1):
+        exponents = [0, 0, 0]
+        exponents[corner] = DEGREE - s
+        exponents[(corner + 1) % 3] = s
+        out.append(EXPONENTS.index(tuple(exponents)))
+    return out
+
+
+def check(condition, message):
+    """Ends the script with `message` unless `condition` holds."""
+    if not condition:
+        sys.exit("FAILED: " + message)
+
+
+def surfaces():
+    """All npz exports in the folder named on the command line; none is a failure."""
+    folder = pathlib.Path(sys.argv[1])
+    found = [Surface(path) for path in sorted(folder.glob("*.npz"))]
+    check(found, f"no npz file in {folder}")
+    return found
