@@ -18,6 +18,9 @@ use std::cell::Cell;
 /// points and results.
 const REGISTER_BYTES: usize = 24 << 10;
 
+/// Floats a cache line.
+const CACHE_LINE: usize = 8;
+
 thread_local! {
     /// Register file of this thread, kept to spare an allocation a call.
     static SCRATCH: Cell<Vec<f64>> = const { Cell::new(Vec::new()) };
@@ -34,18 +37,22 @@ pub(crate) fn evaluate<const K: usize, T>(
     let lanes_in_cache = REGISTER_BYTES / (tape.n_registers * size_of::<f64>());
     let most = [64, 32, 16].into_iter().find(|&lanes| lanes <= lanes_in_cache).unwrap_or(8);
     let mut scratch = SCRATCH.take();
-    if scratch.len() < tape.n_registers * most {
-        scratch.resize(tape.n_registers * most, 0.0);
+    let n_lanes = tape.n_registers * most;
+    if scratch.len() < n_lanes + CACHE_LINE {
+        scratch.resize(n_lanes + CACHE_LINE, 0.0);
     }
+    // Vectors that straddle cache lines cost a quarter of the time.
+    let start = scratch.as_ptr().align_offset(CACHE_LINE * size_of::<f64>()).min(CACHE_LINE);
+    let file = &mut scratch[start..][..n_lanes];
     let mut at = 0;
     while at < points.len() {
         let left = points.len() - at;
         let (points, out) = (&points[at..], &mut out[at..]);
         at += match left.next_power_of_two().clamp(8, most) {
-            64 => block::<64, K, T>(tape, &mut scratch, points, out, &to_result),
-            32 => block::<32, K, T>(tape, &mut scratch, points, out, &to_result),
-            16 => block::<16, K, T>(tape, &mut scratch, points, out, &to_result),
-            _ => block::<8, K, T>(tape, &mut scratch, points, out, &to_result),
+            64 => block::<64, K, T>(tape, file, points, out, &to_result),
+            32 => block::<32, K, T>(tape, file, points, out, &to_result),
+            16 => block::<16, K, T>(tape, file, points, out, &to_result),
+            _ => block::<8, K, T>(tape, file, points, out, &to_result),
         };
     }
     SCRATCH.set(scratch);
@@ -54,12 +61,12 @@ pub(crate) fn evaluate<const K: usize, T>(
 /// The first `N` points or fewer; returns how many.
 fn block<const N: usize, const K: usize, T>(
     tape: &Tape,
-    scratch: &mut [f64],
+    file: &mut [f64],
     points: &[Vec3],
     out: &mut [T],
     to_result: &impl Fn([f64; K]) -> T,
 ) -> usize {
-    let file = &mut scratch.as_chunks_mut::<N>().0[..tape.n_registers];
+    let file = &mut file.as_chunks_mut::<N>().0[..tape.n_registers];
     let n = points.len().min(N);
     let points = &points[..n];
     for &(axis, register) in &tape.inputs {
@@ -158,6 +165,13 @@ fn binary<const N: usize>(row: &mut Row<'_, N>, op: BinaryOp) {
     }
 }
 
+/// A register by fours. Loads of a four stand before its store, so that it becomes one vector
+/// operation: a loop over single lanes is unrolled first and then not vectorised.
+#[inline(always)]
+fn chunks<const N: usize>(register: &[f64; N]) -> &[[f64; 4]] {
+    register.as_chunks().0
+}
+
 /// The registers of one instruction. The result's is never one of the arguments', so that the
 /// compiler needs no check for overlap.
 struct Row<'a, const N: usize> {
@@ -196,33 +210,51 @@ impl<const N: usize> Row<'_, N> {
 
     #[inline(always)]
     fn one(&mut self, f: impl Fn(f64) -> f64) {
-        let (out, [a]) = self.registers();
-        for i in 0..N {
-            out[i] = f(a[i]);
+        let (out, arguments) = self.registers::<1>();
+        let [a] = arguments.map(chunks);
+        for (i, out) in out.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            let (a,) = (a[i],);
+            *out = [f(a[0]), f(a[1]), f(a[2]), f(a[3])];
         }
     }
 
     #[inline(always)]
     fn two(&mut self, f: impl Fn(f64, f64) -> f64) {
-        let (out, [a, b]) = self.registers();
-        for i in 0..N {
-            out[i] = f(a[i], b[i]);
+        let (out, arguments) = self.registers::<2>();
+        let [a, b] = arguments.map(chunks);
+        for (i, out) in out.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            let (a, b) = (a[i], b[i]);
+            *out = [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])];
         }
     }
 
     #[inline(always)]
     fn three(&mut self, f: impl Fn(f64, f64, f64) -> f64) {
-        let (out, [a, b, c]) = self.registers();
-        for i in 0..N {
-            out[i] = f(a[i], b[i], c[i]);
+        let (out, arguments) = self.registers::<3>();
+        let [a, b, c] = arguments.map(chunks);
+        for (i, out) in out.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            let (a, b, c) = (a[i], b[i], c[i]);
+            *out = [
+                f(a[0], b[0], c[0]),
+                f(a[1], b[1], c[1]),
+                f(a[2], b[2], c[2]),
+                f(a[3], b[3], c[3]),
+            ];
         }
     }
 
     #[inline(always)]
     fn four(&mut self, f: impl Fn(f64, f64, f64, f64) -> f64) {
-        let (out, [a, b, c, d]) = self.registers();
-        for i in 0..N {
-            out[i] = f(a[i], b[i], c[i], d[i]);
+        let (out, arguments) = self.registers::<4>();
+        let [a, b, c, d] = arguments.map(chunks);
+        for (i, out) in out.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
+            *out = [
+                f(a[0], b[0], c[0], d[0]),
+                f(a[1], b[1], c[1], d[1]),
+                f(a[2], b[2], c[2], d[2]),
+                f(a[3], b[3], c[3], d[3]),
+            ];
         }
     }
 }

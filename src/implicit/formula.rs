@@ -160,24 +160,3 @@ impl Field for Formula {
         Some(IntervalJet { value, gradient: [x, y, z] })
     }
 }
-
-#[cfg(test)]
-mod size_tests {
-    use super::*;
-    #[test]
-    fn sizes() {
-        let f = Formula::parse("a=0.8;((x^2+y^2-a^2)^2+(z^2-1)^2)*((y^2+z^2-a^2)^2+(x^2-1)^2)*((z^2+x^2-a^2)^2+(y^2-1)^2)-0.02", &BTreeMap::new()).unwrap();
-        for t in [
-            &f.values,
-            f.gradient_tape(),
-            f.hessian_tape(),
-            &f.value_intervals,
-            f.gradient_interval_tape(),
-        ] {
-            println!("{} instr {} regs", t.instructions.len(), t.n_registers);
-        }
-        for i in &f.gradient_tape().instructions {
-            println!("{:?} {:?} -> {} {}", i.op, i.args, i.out, i.constant);
-        }
-    }
-}

@@ -77,6 +77,13 @@ impl Interval {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
+    /// The members of both; of the known one if the other is unknown.
+    #[must_use]
+    pub fn intersection(self, other: Self) -> Self {
+        // `max` and `min` return the other argument if one is NaN.
+        Self { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
+    }
+
     /// The interval moved down by `shift`, rounded outward.
     #[must_use]
     pub fn minus(self, shift: f64) -> Self {
