@@ -176,14 +176,7 @@ mod tests {
     use isospline_implicit::ClosureField;
 
     fn octahedron() -> TriangleMesh {
-        let positions = vec![
-            Vec3::x(),
-            Vec3::y(),
-            Vec3::z(),
-            -Vec3::x(),
-            -Vec3::y(),
-            -Vec3::z(),
-        ];
+        let positions = vec![Vec3::x(), Vec3::y(), Vec3::z(), -Vec3::x(), -Vec3::y(), -Vec3::z()];
         let faces = vec![
             [0, 1, 2],
             [1, 3, 2],

@@ -1,4 +1,96 @@
-//! Stage adapt: a projected mesh becomes a base mesh that is fit to carry patches.
+//! A projected mesh becomes a base mesh that is fit to carry patches.
+//!
+//! The gate: normals along an edge turn at most 60 degrees, the chord rises at most half its
+//! length along a normal, and no face is folded against the normals of its corners. Unfit places
+//! are repaired by flipping, sliding, collapsing and, where nothing else helps, splitting; every
+//! repair is counted. A fit imported mesh passes in all bits of its positions.
 
+mod curve_error;
+mod error;
 pub mod freeze;
+mod gate;
+mod improve;
 pub mod order;
+mod params;
+mod repair;
+mod surface_mesh;
+mod vertex;
+
+pub use error::AdaptError;
+pub use params::{AdaptParams, Improve};
+
+use isospline_artifact::kinds::{BaseMesh, MeshView, TopologyProof};
+use isospline_geometry::TriangleMesh;
+use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
+use surface_mesh::SurfaceMesh;
+
+/// Stage `adapt`.
+#[derive(Clone, Debug)]
+pub struct Adapt {
+    params: AdaptParams,
+}
+
+impl Stage for Adapt {
+    const NAME: &'static str = "adapt";
+    const VERSION: u32 = 1;
+    type Params = AdaptParams;
+    type Whole<'a> = (MeshView<'a>,);
+    type Rows<'a> = ();
+    type Output = BaseMesh;
+    type Error = AdaptError;
+
+    fn prepare(_: &Ctx<'_>, params: &AdaptParams, _: (MeshView<'_>,)) -> Result<Self, AdaptError> {
+        Ok(Self { params: params.clone() })
+    }
+
+    fn plan(&self, _: (MeshView<'_>,), _: usize) -> Plan {
+        Plan::Whole
+    }
+
+    fn process(
+        &self,
+        ctx: &Ctx<'_>,
+        (mesh,): (MeshView<'_>,),
+        (): (),
+        _: &Task,
+    ) -> Result<Piece<BaseMesh>, AdaptError> {
+        let mut counters = Counters::default();
+        let imported =
+            mesh.topology.first().is_none_or(|t| t.proof == TopologyProof::Imported.code());
+        let improving = match self.params.improve {
+            Improve::Auto => !imported,
+            Improve::Always => true,
+            Improve::Never => false,
+        };
+        let fit = self.adapted(ctx, mesh.to_triangles(), improving, &mut counters)?;
+        counters.count("faces_in", mesh.face.len() as u64);
+        counters.count("faces_out", fit.faces.len() as u64);
+        let excess = fit.faces.len().saturating_sub(mesh.face.len());
+        counters.repair("faces_over_target", excess as u64);
+        Ok(Piece { rows: freeze::freeze(&fit, ctx.field)?, counters })
+    }
+}
+
+impl Adapt {
+    fn adapted(
+        &self,
+        ctx: &Ctx<'_>,
+        mesh: TriangleMesh,
+        improving: bool,
+        counters: &mut Counters,
+    ) -> Result<TriangleMesh, AdaptError> {
+        let n_faces = mesh.faces.len();
+        let mut surface = SurfaceMesh::new(ctx.field, mesh)?;
+        counters.max("curve_error_rel_in", improve::worst_curve_error_rel(&surface));
+        if improving {
+            repair::soften(&mut surface, &self.params, counters);
+        }
+        repair::make_fit(ctx, &mut surface, &self.params, counters)?;
+        improve::trim(&mut surface, &self.params, n_faces, counters);
+        if improving {
+            improve::improve(ctx, &mut surface, &self.params, n_faces, counters)?;
+        }
+        counters.max("curve_error_rel", improve::worst_curve_error_rel(&surface));
+        Ok(surface.mesh.compact())
+    }
+}

@@ -1,0 +1,107 @@
+//! When a base mesh is fit to be fitted: turning, slope and tilt of every face.
+
+use crate::AdaptParams;
+use crate::vertex::Vertex;
+
+/// Cosine below which a face counts as folded against the normal of a corner. Positive means that
+/// all sector angles, seen along the normal, lie in (0, 180) degrees; the rest is margin.
+const COS_FOLD: f64 = 0.02;
+
+/// The thresholds. Every figure is scaled so that 1 is the limit and larger is worse.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gate {
+    cos_turning: f64,
+    max_slope: f64,
+    min_quality: f64,
+}
+
+impl Gate {
+    pub(crate) fn new(params: &AdaptParams) -> Self {
+        Self {
+            cos_turning: libm::cos(params.max_turning_deg.to_radians()),
+            max_slope: params.max_slope,
+            min_quality: params.min_quality,
+        }
+    }
+
+    /// Worst of turning and slope of the edge between two vertices.
+    pub(crate) fn edge(&self, p: &Vertex, q: &Vertex) -> f64 {
+        let chord = q.position - p.position;
+        let turning = (1.0 - p.normal.dot(&q.normal)) / (1.0 - self.cos_turning);
+        turning.max(slope(p, q) / self.max_slope).max(if chord.norm() > 0.0 { 0.0 } else { 2.0 })
+    }
+
+    /// Worst of the edges of a face and of its fold; at most 1 if the face is fit.
+    pub(crate) fn face(&self, corners: &[&Vertex; 3]) -> f64 {
+        let [a, b, c] = corners;
+        let edges = self.edge(a, b).max(self.edge(b, c)).max(self.edge(c, a));
+        edges.max((1.0 - cos_tilt(corners)) / (1.0 - COS_FOLD))
+    }
+
+    /// [`Self::face`], raised towards 1, never beyond, for slivers: quality alone does not make a
+    /// face unfit, but of two fit meshes the one without slivers is better.
+    pub(crate) fn face_with_quality(&self, corners: &[&Vertex; 3]) -> f64 {
+        let sliver = 0.9 * self.min_quality / quality(corners);
+        self.face(corners).max(if sliver > 0.9 { sliver.min(0.99) } else { 0.0 })
+    }
+}
+
+/// Angle between the normals of two vertices [deg].
+pub(crate) fn turning_deg(p: &Vertex, q: &Vertex) -> f64 {
+    let (sin, cos) = (p.normal.cross(&q.normal).norm(), p.normal.dot(&q.normal));
+    libm::atan2(sin, cos).to_degrees()
+}
+
+/// Largest part of the chord along the normal at an end.
+pub(crate) fn slope(p: &Vertex, q: &Vertex) -> f64 {
+    let chord = q.position - p.position;
+    chord.dot(&p.normal).abs().max(chord.dot(&q.normal).abs()) / chord.norm()
+}
+
+/// `4 sqrt(3) area / (sum of squared sides)`: 1 if equilateral, 0 if flat.
+pub(crate) fn quality(corners: &[&Vertex; 3]) -> f64 {
+    let [a, b, c] = corners.map(|v| v.position);
+    let sides_sq = (b - a).norm_squared() + (c - b).norm_squared() + (a - c).norm_squared();
+    2.0 * 3f64.sqrt() * (b - a).cross(&(c - a)).norm() / sides_sq
+}
+
+/// Cosine of the largest angle between the face and the normal of a corner; -1 without area.
+fn cos_tilt(corners: &[&Vertex; 3]) -> f64 {
+    let [a, b, c] = corners.map(|v| v.position);
+    let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) else { return -1.0 };
+    corners.iter().map(|v| v.normal.dot(&normal)).fold(1.0, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use isospline_geometry::Vec3;
+
+    fn on_sphere(x: f64, y: f64, z: f64) -> Vertex {
+        let normal = Vec3::new(x, y, z).normalize();
+        Vertex { position: normal, normal, shape: [0.0; 6] }
+    }
+
+    #[test]
+    fn an_edge_of_the_unit_sphere_turns_by_its_angle_and_slopes_by_half_its_sine() {
+        let gate = Gate::new(&AdaptParams::default());
+        for (degrees, fit) in [(20.0f64, true), (59.0, true), (61.0, false)] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let (p, q) = (on_sphere(1.0, 0.0, 0.0), on_sphere(cos, sin, 0.0));
+            assert!((turning_deg(&p, &q) - degrees).abs() < 1e-12);
+            assert!((slope(&p, &q) - (0.5 * degrees).to_radians().sin()).abs() < 1e-14);
+            assert_eq!(gate.edge(&p, &q) <= 1.0, fit);
+        }
+    }
+
+    #[test]
+    fn a_face_that_looks_inward_is_unfit_and_a_sliver_is_not() {
+        let gate = Gate::new(&AdaptParams::default());
+        let (a, b) = (on_sphere(1.0, 0.0, 0.0), on_sphere(1.0, 0.3, 0.0));
+        let (c, thin) = (on_sphere(1.0, 0.1, 0.3), on_sphere(1.0, 0.1, 0.002));
+        assert!(gate.face(&[&a, &b, &c]) < 1.0);
+        assert!(gate.face(&[&a, &c, &b]) > 1.0);
+        let sliver = gate.face_with_quality(&[&a, &b, &thin]);
+        assert!(gate.face_with_quality(&[&a, &b, &c]) < sliver && sliver < 1.0);
+    }
+}

@@ -1,0 +1,275 @@
+//! Rounds that move faces to where the edge curves are worst, at an equal number of faces.
+
+use crate::AdaptParams;
+use crate::curve_error::curve_errors;
+use crate::gate::{Gate, quality};
+use crate::surface_mesh::SurfaceMesh;
+use crate::vertex::{Vertex, feet};
+use isospline_geometry::HalfEdge;
+use isospline_stage::{Counters, Ctx, Stopped};
+
+/// A flip must make the curve of the edge this many times better.
+const FLIP_GAIN: f64 = 1.2;
+/// Part of the edges that are split a round, at most.
+const SPLIT_SHARE: f64 = 0.02;
+/// Edges above this part of the largest error are split.
+const SPLIT_ABOVE: f64 = 0.5;
+/// Collapses may leave this part of the error from which edges are split.
+const COLLAPSE_BELOW: f64 = 0.7;
+/// Badness (1 is unfit) that an edit may leave: short of the gate, so that later edits have room.
+const ROOM: f64 = 0.85;
+/// Rounds without a better mesh before giving up.
+const PATIENCE: u32 = 2;
+
+/// Flips, collapses where curves are good and splits where they are bad; keeps the best round.
+pub(crate) fn improve(
+    ctx: &Ctx<'_>,
+    surface: &mut SurfaceMesh<'_>,
+    params: &AdaptParams,
+    n_faces: usize,
+    counters: &mut Counters,
+) -> Result<(), Stopped> {
+    let gate = Gate::new(params);
+    let mut best = surface.clone();
+    let mut best_error = worst(&edge_errors(surface));
+    let mut failures = 0;
+    let mut edits = Counters::default();
+    for round in 0..params.improve_rounds {
+        ctx.host.progress(u64::from(round), u64::from(params.improve_rounds))?;
+        edits.count("edges_flipped_for_error", flip_round(surface, &gate));
+        let errors = edge_errors(surface);
+        let (limit, n_splits) = split_limit(&errors);
+        let excess = surface.mesh.face_count().saturating_sub(n_faces) / 2;
+        let wanted = n_splits + excess;
+        let collapsed = collapse_round(surface, &gate, &errors, (COLLAPSE_BELOW * limit, wanted));
+        let room = n_faces.saturating_sub(surface.mesh.face_count()) / 2;
+        let split = split_round(surface, &gate, room);
+        edits.count("vertices_collapsed_for_error", collapsed);
+        edits.count("edges_split_for_error", split);
+        let error = worst(&edge_errors(surface));
+        if error < best_error && surface.mesh.face_count() <= n_faces.max(best.mesh.face_count()) {
+            (best, best_error, failures) = (surface.clone(), error, 0);
+            counters.merge(&std::mem::take(&mut edits));
+        } else {
+            failures += 1;
+        }
+        if failures > PATIENCE {
+            break;
+        }
+    }
+    *surface = best;
+    Ok(())
+}
+
+/// Collapses where the curves stay best until at most `n_faces` are left or nothing can go.
+pub(crate) fn trim(
+    surface: &mut SurfaceMesh<'_>,
+    params: &AdaptParams,
+    n_faces: usize,
+    counters: &mut Counters,
+) {
+    let gate = Gate::new(params);
+    // From collapses that nobody sees to any that the gate bears.
+    for part in [0.25, 0.5, 1.0, 4.0, f64::INFINITY] {
+        loop {
+            let excess = surface.mesh.face_count().saturating_sub(n_faces).div_ceil(2);
+            let errors = edge_errors(surface);
+            let limit = part * worst(&errors);
+            let collapsed = collapse_round(surface, &gate, &errors, (limit, excess));
+            counters.repair("vertices_collapsed_for_count", collapsed);
+            if excess == 0 || collapsed == 0 {
+                break;
+            }
+        }
+    }
+}
+
+/// Largest error of an edge curve, times the diagonal.
+pub(crate) fn worst_curve_error_rel(surface: &SurfaceMesh<'_>) -> f64 {
+    worst(&edge_errors(surface)) / surface.diagonal
+}
+
+/// Each edge with the error of its curve.
+type EdgeError = (HalfEdge, f64);
+
+fn edge_errors(surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
+    let edges: Vec<HalfEdge> = surface.mesh.edges().collect();
+    let ends: Vec<[&Vertex; 2]> = edges.iter().map(|&h| surface.ends(h)).collect();
+    edges.iter().copied().zip(curve_errors(surface.field, &ends)).collect()
+}
+
+fn worst(errors: &[EdgeError]) -> f64 {
+    errors.iter().map(|&(_, e)| e).fold(0.0, f64::max)
+}
+
+/// The error above which edges are split, and how many they are.
+fn split_limit(errors: &[EdgeError]) -> (f64, usize) {
+    let mut sorted: Vec<f64> = errors.iter().map(|&(_, e)| e).collect();
+    sorted.sort_by(|x, y| y.total_cmp(x));
+    let most = ((SPLIT_SHARE * sorted.len() as f64) as usize).clamp(1, sorted.len());
+    let limit = sorted[most - 1].max(SPLIT_ABOVE * sorted[0]);
+    (limit, sorted.iter().filter(|&&e| e >= limit).count())
+}
+
+/// Turns edges whose other diagonal has the better curve; worst first.
+fn flip_round(surface: &mut SurfaceMesh<'_>, gate: &Gate) -> u64 {
+    let errors = edge_errors(surface);
+    let turned: Vec<[&Vertex; 2]> = errors
+        .iter()
+        .map(|&(h, _)| surface.wings(h).map_or(surface.ends(h), |w| w.map(|v| surface.at(v))))
+        .collect();
+    let others = curve_errors(surface.field, &turned);
+    let gains = errors.iter().zip(others).filter(|((_, now), then)| FLIP_GAIN * then < *now);
+    let mut gains: Vec<EdgeError> = gains.map(|(&edge, _)| edge).collect();
+    gains.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
+    let mut touched = vec![false; surface.mesh.face_rows()];
+    let mut n_flips = 0;
+    for (h, _) in gains {
+        let Some(o) = surface.mesh.opposite(h) else { continue };
+        let faces = [h.face() as usize, o.face() as usize];
+        if faces.iter().any(|&f| touched[f]) || !flip_is_good(surface, gate, h) {
+            continue;
+        }
+        surface.mesh.flip(h);
+        faces.iter().for_each(|&f| touched[f] = true);
+        n_flips += 1;
+    }
+    n_flips
+}
+
+fn flip_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge) -> bool {
+    let Some(wings) = surface.wings(h) else { return false };
+    let [c, d] = wings.map(|v| surface.at(v));
+    let [a, b] = surface.ends(h);
+    let quality_of = |faces: [[&Vertex; 3]; 2]| quality(&faces[0]).min(quality(&faces[1]));
+    let before = quality_of([[a, b, c], [b, a, d]]);
+    let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
+    quality_of([[d, c, a], [c, d, b]]) >= before.min(0.2)
+        && ends.iter().all(|&v| surface.mesh.valence(v) > 4)
+        && wings.iter().all(|&v| surface.mesh.valence(v) < 10)
+        && surface.flip_cost(gate, h).is_some_and(|[before, after]| after <= before.max(ROOM))
+}
+
+/// Merges up to `n_wanted` edges whose new curves stay below `limit`; best first.
+fn collapse_round(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    errors: &[EdgeError],
+    (limit, n_wanted): (f64, usize),
+) -> u64 {
+    let candidates = collapse_candidates(surface, gate, errors, (limit, n_wanted));
+    let rings: Vec<Vec<Vertex>> = candidates
+        .iter()
+        .map(|&(h, _)| ring(surface, h).map(|v| *surface.at(v)).collect())
+        .collect();
+    let spokes: Vec<[&Vertex; 2]> = candidates
+        .iter()
+        .zip(&rings)
+        .flat_map(|((_, merged), ring)| ring.iter().map(move |v| [merged, v]))
+        .collect();
+    let new_errors = curve_errors(surface.field, &spokes);
+    let mut rest = new_errors.as_slice();
+    let mut order = Vec::with_capacity(candidates.len());
+    for (k, ring) in rings.iter().enumerate() {
+        let (own, others) = rest.split_at(ring.len());
+        rest = others;
+        order.push((own.iter().copied().fold(0.0, f64::max), k));
+    }
+    order.retain(|&(e, _)| e < limit || limit == f64::INFINITY);
+    order.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+    let mut touched = vec![false; surface.mesh.vertex_rows()];
+    let mut n_collapsed = 0;
+    for (_, k) in order {
+        let (h, merged) = &candidates[k];
+        if n_collapsed == n_wanted as u64 || !surface.mesh.is_face(h.face()) {
+            continue;
+        }
+        let around: Vec<u32> = ring(surface, *h).chain([surface.mesh.origin(*h)]).collect();
+        if around.iter().any(|&v| touched[v as usize]) {
+            continue;
+        }
+        // The surroundings are as they were, but the link condition may look beyond them.
+        if surface.collapse_cost(gate, *h, merged).is_some_and(|after| after < ROOM) {
+            around.iter().for_each(|&v| touched[v as usize] = true);
+            touched[surface.mesh.target(*h) as usize] = true;
+            surface.collapse(*h, *merged);
+            n_collapsed += 1;
+        }
+    }
+    n_collapsed
+}
+
+/// Edges in the quietest places whose merging the gate bears, with the merged vertex.
+fn collapse_candidates(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    errors: &[EdgeError],
+    (limit, n_wanted): (f64, usize),
+) -> Vec<(HalfEdge, Vertex)> {
+    let mut around = vec![0.0f64; surface.mesh.vertex_rows()];
+    for &(h, error) in errors {
+        for v in [surface.mesh.origin(h), surface.mesh.target(h)] {
+            around[v as usize] = around[v as usize].max(error);
+        }
+    }
+    let score = |h: HalfEdge| {
+        let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
+        around[ends[0] as usize].max(around[ends[1] as usize])
+    };
+    let mut quiet: Vec<EdgeError> = errors.iter().map(|&(h, _)| (h, score(h))).collect();
+    quiet.retain(|&(_, e)| e < limit);
+    quiet.sort_by(|x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
+    // Neighbours exclude each other and the gate refuses some: look at more than are wanted.
+    quiet.truncate(12 * n_wanted + 64);
+    let middles: Vec<_> = quiet.iter().map(|&(h, _)| surface.middle(h)).collect();
+    let merged = feet(surface.field, surface.diagonal, &middles);
+    let mut candidates = Vec::new();
+    for (&(h, _), merged) in quiet.iter().zip(&merged) {
+        let Some(merged) = merged else { continue };
+        if surface.collapse_cost(gate, h, merged).is_some_and(|after| after < ROOM) {
+            candidates.push((h, *merged));
+        }
+    }
+    candidates
+}
+
+/// The vertices about an edge: the neighbours of its ends without the ends; wings come twice.
+fn ring<'s>(surface: &'s SurfaceMesh<'_>, h: HalfEdge) -> impl Iterator<Item = u32> + 's {
+    let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
+    ends.into_iter().flat_map(|v| surface.mesh.neighbours(v)).filter(move |v| !ends.contains(v))
+}
+
+/// Splits up to `n_room` edges, the worst that can be, none beside another.
+fn split_round(surface: &mut SurfaceMesh<'_>, gate: &Gate, n_room: usize) -> u64 {
+    let mut bad = edge_errors(surface);
+    bad.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
+    bad.truncate(12 * n_room);
+    let middles: Vec<_> = bad.iter().map(|&(h, _)| surface.middle(h)).collect();
+    let middles = feet(surface.field, surface.diagonal, &middles);
+    let mut touched = vec![false; surface.mesh.vertex_rows()];
+    let mut n_split = 0;
+    for (&(h, _), middle) in bad.iter().zip(&middles) {
+        let (Some(middle), Some(wings)) = (middle, surface.wings(h)) else { continue };
+        let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
+        let around = [ends[0], ends[1], wings[0], wings[1]];
+        if n_split == n_room as u64
+            || around.iter().any(|&v| touched.get(v as usize).copied().unwrap_or(true))
+            || !split_is_good(surface, gate, h, middle)
+        {
+            continue;
+        }
+        if surface.split(h, *middle).is_some() {
+            around.iter().for_each(|&v| touched[v as usize] = true);
+            n_split += 1;
+        }
+    }
+    n_split
+}
+
+fn split_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge, middle: &Vertex) -> bool {
+    let [a, b] = surface.ends(h);
+    let Some(wings) = surface.wings(h) else { return false };
+    let [c, d] = wings.map(|v| surface.at(v));
+    let halves = [[a, middle, c], [middle, b, c], [b, middle, d], [middle, a, d]];
+    halves.iter().all(|face| gate.face_with_quality(face) < ROOM)
+}

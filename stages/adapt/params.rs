@@ -1,0 +1,63 @@
+//! Parameters of the repair.
+
+/// When a fit mesh is improved further.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Improve {
+    /// Unless the mesh was imported: the author of a base mesh wants it as it is.
+    #[default]
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// Parameters of the repair.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AdaptParams {
+    /// Largest angle between the normals at the ends of an edge [deg], 5 to 120.
+    pub max_turning_deg: f64,
+    /// Largest part of an edge's chord along the normal at an end, 0.05 to 1.
+    pub max_slope: f64,
+    /// Quality (1 if equilateral) below which a face is a sliver, 0 to 0.5: avoided, not refused.
+    pub min_quality: f64,
+    /// Rounds of repair at most, 1 to 1000.
+    pub max_rounds: u32,
+    /// When a fit mesh is improved.
+    pub improve: Improve,
+    /// Rounds of improvement at most, 0 to 1000.
+    pub improve_rounds: u32,
+}
+
+impl Default for AdaptParams {
+    fn default() -> Self {
+        Self {
+            max_turning_deg: 60.0,
+            max_slope: 0.5,
+            min_quality: 0.1,
+            max_rounds: 40,
+            improve: Improve::Auto,
+            improve_rounds: 8,
+        }
+    }
+}
+
+impl isospline_stage::Params for AdaptParams {
+    fn validate(&self) -> Result<(), (&'static str, String)> {
+        let ranges = [
+            ("max_turning_deg", self.max_turning_deg, 5.0, 120.0),
+            ("max_slope", self.max_slope, 0.05, 1.0),
+            ("min_quality", self.min_quality, 0.0, 0.5),
+            ("max_rounds", f64::from(self.max_rounds), 1.0, 1000.0),
+            ("improve_rounds", f64::from(self.improve_rounds), 0.0, 1000.0),
+        ];
+        for (key, value, low, high) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err((key, format!("{value} is not in {low} to {high}")));
+            }
+        }
+        Ok(())
+    }
+}

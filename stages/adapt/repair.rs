@@ -1,0 +1,209 @@
+//! Rounds of local edits until every face is fit.
+
+use crate::gate::{Gate, slope, turning_deg};
+use crate::surface_mesh::SurfaceMesh;
+use crate::{AdaptError, AdaptParams};
+use isospline_geometry::{HalfEdge, Vec3};
+use isospline_stage::{Counters, Ctx};
+
+/// An edit must leave at most this part of the badness, or no unfit face: smaller gains would let
+/// edits chase each other.
+const GAIN: f64 = 0.95;
+/// Badness (1 is unfit) from which faces are repaired where the mesh may be improved: above it
+/// lie slivers and edges near the gate.
+const SOFT: f64 = 0.9;
+/// Least part of an edge that a split leaves on either side.
+const SHORTEST_HALF: f64 = 0.1;
+/// Rounds of the soft repair: what two passes of flips and slides do not mend, they never do.
+const SOFT_ROUNDS: u32 = 3;
+
+/// Makes every face fit, by flips, slides and collapses where they help and by splits where not.
+///
+/// # Errors
+/// [`AdaptError::Unfit`] if faces are unfit after `params.max_rounds`.
+pub(crate) fn make_fit(
+    ctx: &Ctx<'_>,
+    surface: &mut SurfaceMesh<'_>,
+    params: &AdaptParams,
+    counters: &mut Counters,
+) -> Result<(), AdaptError> {
+    let gate = Gate::new(params);
+    for round in 0..params.max_rounds {
+        let unfit = faces_above(surface, |s, f| gate.face(&s.corners(f)), 1.0);
+        if unfit.is_empty() {
+            return Ok(());
+        }
+        if round == 0 {
+            counters.count("unfit_faces_in", unfit.len() as u64);
+        }
+        ctx.host.progress(u64::from(round), u64::from(params.max_rounds))?;
+        let mut split_near = vec![false; surface.mesh.vertex_rows()];
+        for &face in &unfit {
+            let still =
+                |s: &SurfaceMesh<'_>| s.mesh.is_face(face) && gate.face(&s.corners(face)) > 1.0;
+            if still(surface) && !mend(surface, &gate, face, counters) {
+                split(surface, &gate, face, &mut split_near, counters);
+            }
+        }
+    }
+    match worst_edge(surface, &gate) {
+        None => Ok(()),
+        Some(error) => Err(error),
+    }
+}
+
+/// Flips, slides and collapses slivers and edges near the gate; nothing is split.
+pub(crate) fn soften(surface: &mut SurfaceMesh<'_>, params: &AdaptParams, counters: &mut Counters) {
+    let gate = Gate::new(params);
+    let cost = |s: &SurfaceMesh<'_>, f: u32| gate.face_with_quality(&s.corners(f));
+    for _ in 0..SOFT_ROUNDS {
+        for face in faces_above(surface, cost, SOFT) {
+            if surface.mesh.is_face(face) && cost(surface, face) > SOFT {
+                mend(surface, &gate, face, counters);
+            }
+        }
+    }
+}
+
+/// Faces above a limit, worst first.
+fn faces_above(
+    surface: &SurfaceMesh<'_>,
+    cost: impl Fn(&SurfaceMesh<'_>, u32) -> f64,
+    limit: f64,
+) -> Vec<u32> {
+    let faces = surface.mesh.live_faces().map(|f| (cost(surface, f), f));
+    let mut above: Vec<(f64, u32)> = faces.filter(|&(c, _)| c > limit).collect();
+    above.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+    above.into_iter().map(|(_, f)| f).collect()
+}
+
+/// One edit that makes the face better without adding faces.
+fn mend(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32, counters: &mut Counters) -> bool {
+    if flip(surface, gate, face) {
+        counters.repair("edges_flipped", 1);
+    } else if slide(surface, gate, face) {
+        counters.repair("vertices_slid", 1);
+    } else if collapse(surface, gate, face) {
+        counters.repair("vertices_collapsed", 1);
+    } else {
+        return false;
+    }
+    true
+}
+
+fn halves(face: u32) -> [HalfEdge; 3] {
+    [0, 1, 2].map(|k| HalfEdge::new(face, k))
+}
+
+/// The flip that leaves the best faces.
+fn flip(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> bool {
+    let mut best: Option<(f64, HalfEdge)> = None;
+    for h in halves(face) {
+        let Some([before, after]) = surface.flip_cost(gate, h) else { continue };
+        if after < GAIN * before && best.is_none_or(|(least, _)| after < least) {
+            best = Some((after, h));
+        }
+    }
+    let Some((_, h)) = best else { return false };
+    surface.mesh.flip(h);
+    true
+}
+
+/// Moves a corner towards the middle of its neighbours, along the surface.
+fn slide(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> bool {
+    for v in surface.mesh.face(face) {
+        let before = surface.fan_cost(gate, v);
+        let (n, sum) = surface
+            .mesh
+            .neighbours(v)
+            .fold((0.0, Vec3::zeros()), |(n, sum), w| (n + 1.0, sum + surface.at(w).position));
+        let step = sum / n - surface.at(v).position;
+        for part in [1.0, 0.5, 0.25] {
+            let target = surface.at(v).position + part * step;
+            let Some(moved) = surface.foot(target, step.norm()) else { continue };
+            if surface.move_cost(gate, v, &moved) < GAIN * before {
+                surface.place(v, moved);
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// Merges the ends of an edge, shortest first, if the faces left are fit and better.
+fn collapse(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> bool {
+    let mut sides = halves(face).map(|h| {
+        let [p, q] = surface.ends(h);
+        ((q.position - p.position).norm(), h)
+    });
+    sides.sort_by(|x, y| x.0.total_cmp(&y.0));
+    for (length, h) in sides {
+        let ends = surface.ends(h).map(|v| *v);
+        let before =
+            [surface.mesh.origin(h), surface.mesh.target(h)].map(|v| surface.fan_cost(gate, v));
+        let limit = (GAIN * before[0].max(before[1])).min(SOFT);
+        let middle = surface.foot(surface.middle(h), length);
+        for merged in middle.into_iter().chain(ends) {
+            if surface.collapse_cost(gate, h, &merged).is_some_and(|after| after < limit) {
+                surface.collapse(h, merged);
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// Splits the worst edge of the face at its middle, unless a corner has a new edge already.
+fn split(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    face: u32,
+    split_near: &mut [bool],
+    counters: &mut Counters,
+) {
+    let mut sides = halves(face).map(|h| {
+        let [p, q] = surface.ends(h);
+        // Only an unfit edge is worth its own measure: of a folded face the longest edge goes.
+        (gate.edge(p, q).max(1.0), (q.position - p.position).norm(), h)
+    });
+    sides.sort_by(|x, y| y.0.total_cmp(&x.0).then(y.1.total_cmp(&x.1)));
+    let (_, length, h) = sides[0];
+    let Some(wings) = surface.wings(h) else { return };
+    let around = [wings[0], wings[1], surface.mesh.origin(h), surface.mesh.target(h)];
+    // Vertices of this round lie beyond the list: next to them all is new.
+    if around.iter().any(|&v| split_near.get(v as usize).copied().unwrap_or(true)) {
+        return;
+    }
+    let Some(middle) = surface.foot(surface.middle(h), length) else { return };
+    // Where the surface folds away below an edge the foot falls to an end: halves no shorter.
+    let ends = surface.ends(h).map(|v| (v.position - middle.position).norm());
+    if ends.iter().any(|&half| half < SHORTEST_HALF * length) {
+        return;
+    }
+    if surface.split(h, middle).is_some() {
+        counters.repair("edges_split", 1);
+        for v in around {
+            split_near[v as usize] = true;
+        }
+    }
+}
+
+/// The error that names the worst edge of an unfit face, if there is one.
+fn worst_edge(surface: &SurfaceMesh<'_>, gate: &Gate) -> Option<AdaptError> {
+    let unfit = faces_above(surface, |s, f| gate.face(&s.corners(f)), 1.0);
+    let badness = |h: HalfEdge| {
+        let [p, q] = surface.ends(h);
+        gate.edge(p, q)
+    };
+    let h = halves(*unfit.first()?)
+        .into_iter()
+        .max_by(|&x, &y| badness(x).total_cmp(&badness(y)))
+        .expect("invariant: a face has edges");
+    let [p, q] = surface.ends(h);
+    Some(AdaptError::Unfit {
+        unfit_faces: unfit.len() as u32,
+        place: surface.middle(h),
+        turning_deg: turning_deg(p, q),
+        slope: slope(p, q),
+    })
+}

@@ -1,0 +1,132 @@
+//! A mesh under edit together with what the field says at its vertices.
+//!
+//! `*_cost` tells how bad the faces that an edit touches would be after it, on the scale of the
+//! [`Gate`]; the edit itself is a second call.
+
+use crate::AdaptError;
+use crate::gate::Gate;
+use crate::vertex::{Vertex, feet, vertices_at};
+use isospline_geometry::{EditMesh, HalfEdge, TriangleMesh, Vec3};
+use isospline_implicit::Field;
+
+/// A mesh on a surface.
+#[derive(Clone)]
+pub(crate) struct SurfaceMesh<'a> {
+    pub(crate) field: &'a dyn Field,
+    /// Diagonal of the bounding box of the input: the unit of relative lengths.
+    pub(crate) diagonal: f64,
+    pub(crate) mesh: EditMesh,
+    pub(crate) vertices: Vec<Vertex>,
+}
+
+impl<'a> SurfaceMesh<'a> {
+    pub(crate) fn new(field: &'a dyn Field, mesh: TriangleMesh) -> Result<Self, AdaptError> {
+        let diagonal = mesh.bounds().diagonal();
+        let vertices = vertices_at(field, &mesh.positions)?;
+        Ok(Self { field, diagonal, mesh: EditMesh::new(mesh)?, vertices })
+    }
+
+    pub(crate) fn at(&self, vertex: u32) -> &Vertex {
+        &self.vertices[vertex as usize]
+    }
+
+    pub(crate) fn corners(&self, face: u32) -> [&Vertex; 3] {
+        self.mesh.face(face).map(|v| self.at(v))
+    }
+
+    /// The two ends of `h`.
+    pub(crate) fn ends(&self, h: HalfEdge) -> [&Vertex; 2] {
+        [self.at(self.mesh.origin(h)), self.at(self.mesh.target(h))]
+    }
+
+    /// The vertices opposite to an inner edge: of the face of `h`, then of its opposite.
+    pub(crate) fn wings(&self, h: HalfEdge) -> Option<[u32; 2]> {
+        let o = self.mesh.opposite(h)?;
+        Some([self.mesh.origin(h.prev()), self.mesh.origin(o.prev())])
+    }
+
+    pub(crate) fn middle(&self, h: HalfEdge) -> Vec3 {
+        let [p, q] = self.ends(h);
+        0.5 * (p.position + q.position)
+    }
+
+    /// The point of the surface at `point`, unless it is farther away than `reach`.
+    pub(crate) fn foot(&self, point: Vec3, reach: f64) -> Option<Vertex> {
+        let foot = feet(self.field, self.diagonal, &[point])[0]?;
+        ((foot.position - point).norm() <= reach).then_some(foot)
+    }
+
+    /// Worst of the faces about a vertex.
+    pub(crate) fn fan_cost(&self, gate: &Gate, vertex: u32) -> f64 {
+        let faces = self.mesh.spokes(vertex).map(|h| h.face());
+        faces.map(|f| gate.face_with_quality(&self.corners(f))).fold(0.0, f64::max)
+    }
+
+    /// Worst of the faces about a vertex if it were `moved`.
+    pub(crate) fn move_cost(&self, gate: &Gate, vertex: u32, moved: &Vertex) -> f64 {
+        self.fan_cost_without(gate, vertex, moved, [u32::MAX; 2])
+    }
+
+    pub(crate) fn place(&mut self, vertex: u32, moved: Vertex) {
+        self.vertices[vertex as usize] = moved;
+        self.mesh.positions[vertex as usize] = moved.position;
+    }
+
+    /// Worst of the two faces beside an edge, now and after a flip; `None` if it cannot flip.
+    pub(crate) fn flip_cost(&self, gate: &Gate, h: HalfEdge) -> Option<[f64; 2]> {
+        if !self.mesh.can_flip(h) {
+            return None;
+        }
+        let [a, b] = self.ends(h);
+        let [c, d] = self.wings(h)?.map(|v| self.at(v));
+        let worst = |x, y| gate.face_with_quality(x).max(gate.face_with_quality(y));
+        Some([worst(&[a, b, c], &[b, a, d]), worst(&[d, c, a], &[c, d, b])])
+    }
+
+    /// Worst of the faces left about the ends of `h` if they became `merged`; `None` if they
+    /// cannot merge or a vertex would keep fewer than four edges.
+    pub(crate) fn collapse_cost(
+        &mut self,
+        gate: &Gate,
+        h: HalfEdge,
+        merged: &Vertex,
+    ) -> Option<f64> {
+        if !self.mesh.can_collapse(h) {
+            return None;
+        }
+        let o = self.mesh.opposite(h)?;
+        let ends = [self.mesh.origin(h), self.mesh.target(h)];
+        let wings = self.wings(h)?;
+        let merged_valence = self.mesh.valence(ends[0]) + self.mesh.valence(ends[1]) - 4;
+        if !(4..=10).contains(&merged_valence) || wings.iter().any(|&v| self.mesh.valence(v) < 5) {
+            return None;
+        }
+        let removed = [h.face(), o.face()];
+        Some(ends.iter().fold(0.0, |worst, &v| {
+            f64::max(worst, self.fan_cost_without(gate, v, merged, removed))
+        }))
+    }
+
+    /// The caller has asked [`Self::collapse_cost`].
+    pub(crate) fn collapse(&mut self, h: HalfEdge, merged: Vertex) {
+        let kept = self.mesh.origin(h);
+        self.mesh.collapse(h);
+        self.place(kept, merged);
+    }
+
+    /// Puts `middle` on the edge; `None` at a border.
+    pub(crate) fn split(&mut self, h: HalfEdge, middle: Vertex) -> Option<u32> {
+        let vertex = self.mesh.split(h, middle.position)?;
+        self.vertices.push(middle);
+        Some(vertex)
+    }
+
+    fn fan_cost_without(&self, gate: &Gate, vertex: u32, moved: &Vertex, removed: [u32; 2]) -> f64 {
+        let kept = self.mesh.spokes(vertex).filter(|h| !removed.contains(&h.face()));
+        let cost = |h: HalfEdge| {
+            let (p, q) = (self.mesh.target(h), self.mesh.origin(h.prev()));
+            gate.face_with_quality(&[moved, self.at(p), self.at(q)])
+        };
+        kept.map(cost).fold(0.0, f64::max)
+    }
+}
