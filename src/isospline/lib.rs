@@ -1,1 +1,23 @@
-//! Implicit surfaces to watertight G1 triangular spline surfaces: library and command line
+//! Implicit surfaces to watertight G1 triangular spline surfaces.
+//!
+//! [`convert`] turns a field of the caller's own into a surface in memory; [`ModelFolder`] turns a
+//! model file into a folder of artifacts, as the command line does.
+
+pub mod config;
+mod convert;
+mod folder;
+mod model;
+pub mod report;
+pub mod stages;
+
+pub use convert::{Conversion, ConvertError, Options, convert, convert_with_events};
+pub use folder::{FolderError, MODEL_NOTE, ModelFolder, REPORT_NOTE};
+pub use isospline_check::{CheckParams, CheckReport};
+pub use isospline_geometry::{Aabb, TriangleMesh, Vec3};
+pub use isospline_implicit::{ClosureField, Field, InsideError};
+pub use model::{Model, ModelError};
+
+/// Threads for the checker, as it takes them.
+pub fn lent_threads(_threads: usize) -> impl Fn(usize, &(dyn Fn(usize) + Sync)) {
+    isospline_check::on_this_thread
+}

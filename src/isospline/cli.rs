@@ -1,0 +1,39 @@
+//! Commands: each takes its arguments and gives an exit code or a failure.
+
+pub(crate) mod args;
+mod check;
+mod export;
+pub(crate) mod failure;
+mod output;
+mod progress;
+mod run;
+mod status;
+mod tables;
+
+use args::{Cli, Command};
+use failure::Failure;
+use std::sync::atomic::AtomicBool;
+
+/// Carries out a command; failures are shown on standard error.
+pub(crate) fn dispatch(args: &Cli, stop: &AtomicBool) -> u8 {
+    let (outcome, json) = match &args.command {
+        Command::Run(args) => (run::run(args, stop), args.model.json),
+        Command::Stage(args) => (run::stage(args, stop), args.model.json),
+        Command::Status { dir } => (status::status(dir), false),
+        Command::Inspect { file, verify } => (status::inspect(file, *verify), false),
+        Command::Check(args) => (check::check(args), args.json),
+        Command::Export(args) => (export::export(args), false),
+    };
+    outcome.unwrap_or_else(|failure| report(failure, json))
+}
+
+/// Shows a failure; with `--json` it also ends the lines of standard output.
+fn report(failure: Failure, json: bool) -> u8 {
+    let exit = failure.exit();
+    if json {
+        // The failure itself is what counts; a closed pipe cannot be told anything.
+        let _ = output::say(&failure.to_json().to_string());
+    }
+    output::note(&format!("{:?}", miette::Report::new(failure)));
+    exit
+}

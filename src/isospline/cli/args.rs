@@ -1,0 +1,190 @@
+//! The command line: commands, options and their help.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Implicit surfaces to watertight G1 triangular spline surfaces.
+#[derive(Debug, Parser)]
+#[command(name = "isospline", version, about, after_help = EXIT_CODES, max_term_width = 100)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// What `--help` says of exit codes; `failure.rs` gives them.
+pub(crate) const EXIT_CODES: &str = "\
+Exit codes:
+    0  done; a check passed
+    1  a check did not pass
+    2  the command line is wrong
+   10  the model file (or a mesh it names) cannot be read
+   11  the model file has a bad key or value
+   12  the formula cannot be read
+   20  the field is not a number somewhere on the surface
+   21  the level set is empty
+   22  the surface is singular somewhere
+   23  the surface leaves the box
+   24  the faces are too few for the topology
+   25  the surface cannot be converted for another reason
+   26  the base mesh cannot be used
+   30  an artifact is of another version of the program
+   31  an artifact is damaged or missing
+   32  the folder is in use by another isospline
+   33  a file cannot be read or written
+   70  a bug of isospline
+  130  stopped; what was finished is kept";
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Convert a model: run every stage that is not fresh, then check the surface
+    #[command(after_help = RUN_EXAMPLES)]
+    Run(RunArgs),
+    /// Run one stage alone; what it reads must be fresh
+    #[command(after_help = STAGE_EXAMPLES)]
+    Stage(StageArgs),
+    /// Say of every stage of a model folder whether it is fresh, stale (and why) or missing
+    #[command(after_help = "Example:\n  isospline status out/deccube")]
+    Status {
+        /// The model folder
+        dir: PathBuf,
+    },
+    /// Print what an artifact holds: kind, keys, sections, counters
+    #[command(after_help = INSPECT_EXAMPLES)]
+    Inspect {
+        /// An artifact (.isos)
+        file: PathBuf,
+        /// Verify the checksums of all rows
+        #[arg(long)]
+        verify: bool,
+    },
+    /// Measure a finished surface from outside and hold it against the limits of [check]
+    #[command(after_help = CHECK_EXAMPLES)]
+    Check(CheckArgs),
+    /// Write a finished surface in another format
+    #[command(after_help = EXPORT_EXAMPLES)]
+    Export(ExportArgs),
+}
+
+const RUN_EXAMPLES: &str = "\
+Examples:
+  isospline run configs/deccube.toml
+  isospline run configs/torus.toml --set target.faces=1000 --out out/torus_1000
+  isospline run --formula \"x^2 + y^2 + z^2 - 1\" --set target.faces=100
+  isospline run configs/chair.toml --from network --json
+
+The folder is out/<model name>. A second run with nothing changed does nothing; after a change
+only the stages that depend on it run again.";
+
+const STAGE_EXAMPLES: &str = "\
+Examples:
+  isospline stage polygonize configs/deccube.toml
+  isospline stage network configs/deccube.toml --set network.samples=24";
+
+const INSPECT_EXAMPLES: &str = "\
+Examples:
+  isospline inspect out/deccube/11-fairing.isos
+  isospline inspect --verify out/deccube/07-network.isos";
+
+const CHECK_EXAMPLES: &str = "\
+Examples:
+  isospline check out/deccube
+  isospline check out/deccube --json
+  isospline check deccube.npz --model configs/deccube.toml
+
+The exit code is 1 if the surface does not pass.";
+
+const EXPORT_EXAMPLES: &str = "\
+Examples:
+  isospline export out/deccube --format glb
+  isospline export out/deccube --format vtu -o deccube.vtu
+  isospline export out/deccube --format stl --samples 16
+
+vtu and npz hold the patches exactly; glb, obj, ply and stl hold triangles.";
+
+/// Which model, and how to run it.
+#[derive(Debug, Args)]
+pub(crate) struct ModelArgs {
+    /// The model file
+    #[arg(value_name = "MODEL.toml", required_unless_present = "formula")]
+    pub(crate) model: Option<PathBuf>,
+    /// A formula in x, y, z in place of a model file
+    #[arg(long, value_name = "TEXT", conflicts_with = "model")]
+    pub(crate) formula: Option<String>,
+    /// The model folder; default out/<model name>
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Sets a key of the model file, such as target.faces=2000; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) overrides: Vec<String>,
+    /// Working threads; default: the processors. The output does not depend on them
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+    /// Do not wait for the disk: survives a kill, not a power cut
+    #[arg(long)]
+    pub(crate) no_sync: bool,
+    /// Print events as JSON, one a line
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RunArgs {
+    #[command(flatten)]
+    pub(crate) model: ModelArgs,
+    /// Run this stage and all after it even if they are fresh
+    #[arg(long, value_name = "STAGE")]
+    pub(crate) from: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct StageArgs {
+    /// The stage
+    pub(crate) name: String,
+    #[command(flatten)]
+    pub(crate) model: ModelArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// A model folder, or an .npz export
+    pub(crate) path: PathBuf,
+    /// The model file of an .npz export
+    #[arg(long, value_name = "MODEL.toml")]
+    pub(crate) model: Option<PathBuf>,
+    /// Print the figures as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// The model folder
+    pub(crate) dir: PathBuf,
+    /// The format
+    #[arg(long, value_enum)]
+    pub(crate) format: FormatArg,
+    /// The file; default DIR/<model name>.<format>
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Segments an edge is cut into, for formats of triangles
+    #[arg(long, value_name = "N", default_value_t = 8,
+        value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub(crate) samples: u32,
+}
+
+/// Formats of `export`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum FormatArg {
+    /// VTK unstructured grid with exact Bézier cells
+    Vtu,
+    /// Binary glTF, to look at
+    Glb,
+    /// Wavefront OBJ
+    Obj,
+    /// Stanford PLY
+    Ply,
+    /// Binary STL
+    Stl,
+    /// Arrays for numpy: vertices, faces, control points
+    Npz,
+}

@@ -1,0 +1,128 @@
+//! Commands `run` and `stage`.
+
+use crate::cli::args::{ModelArgs, RunArgs, StageArgs};
+use crate::cli::failure::{CHECK_FAILED, Failure};
+use crate::cli::output::{duration, note, say};
+use crate::cli::progress::Progress;
+use crate::cli::tables;
+use isospline::config::{ConfigError, ModelFile};
+use isospline::report::{ConversionReport, fingerprint};
+use isospline::{Model, ModelFolder, REPORT_NOTE};
+use isospline_artifact::Durability;
+use isospline_pipeline::{RunOptions, RunReport};
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+/// Converts a model and checks the surface.
+pub(crate) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<u8, Failure> {
+    let folder = folder(&args.model)?;
+    let options = RunOptions { from: args.from.as_deref(), ..options(&args.model, stop) };
+    let report = execute(&folder, &options, args.model.json)?;
+    if report.all_fresh()
+        && let Some(code) = last_verdict(&folder, &report, args.model.json)?
+    {
+        return Ok(code);
+    }
+    let check = folder.check(&isospline::lent_threads(options.threads))?;
+    let report = ConversionReport::new(&folder, &report, options.threads, check)?;
+    let bytes = serde_json::to_vec_pretty(&report).expect("invariant: a report is plain data");
+    folder.write_note(REPORT_NOTE, &bytes)?;
+    show(&folder, &report, args.model.json)?;
+    Ok(verdict(report.check.pass))
+}
+
+/// Runs one stage alone.
+pub(crate) fn stage(args: &StageArgs, stop: &AtomicBool) -> Result<u8, Failure> {
+    let folder = folder(&args.model)?;
+    let options = RunOptions { only: Some(&args.name), ..options(&args.model, stop) };
+    let report = execute(&folder, &options, args.model.json)?;
+    if !args.model.json {
+        for node in &report.nodes {
+            let file = folder.path().join(&node.artifact);
+            let done = if report.all_fresh() { "is fresh" } else { "is written" };
+            say(&format!("{} {done}: {}", node.stage, file.display()))?;
+        }
+    }
+    Ok(0)
+}
+
+fn folder(args: &ModelArgs) -> Result<ModelFolder, Failure> {
+    let file = model_file(args)?;
+    let default = || PathBuf::from("out").join(&file.model.name);
+    let path = args.out.clone().unwrap_or_else(default);
+    let durability = if args.no_sync { Durability::Fast } else { Durability::Durable };
+    let model = Model::new(file)?;
+    for remark in model.remarks() {
+        note(&remark);
+    }
+    Ok(ModelFolder::new(model, path, durability))
+}
+
+fn model_file(args: &ModelArgs) -> Result<ModelFile, ConfigError> {
+    match (&args.formula, &args.model) {
+        (Some(formula), _) => ModelFile::from_formula(formula, &args.overrides),
+        (None, path) => {
+            let path = path.as_ref().expect("invariant: clap asks for a model or a formula");
+            ModelFile::open(path, &args.overrides)
+        }
+    }
+}
+
+fn options<'a>(args: &ModelArgs, stop: &'a AtomicBool) -> RunOptions<'a> {
+    let defaults = RunOptions::default();
+    let threads = args.threads.map_or(defaults.threads, |n| n as usize);
+    RunOptions { threads, stop, ..defaults }
+}
+
+fn execute(
+    folder: &ModelFolder,
+    options: &RunOptions<'_>,
+    json: bool,
+) -> Result<RunReport, Failure> {
+    let progress = Progress::new(json);
+    let outcome = folder.run(options, &|event| progress.show(event));
+    progress.end();
+    Ok(outcome?)
+}
+
+/// The exit code of the last check, if that was of the same surface and limits; tells so.
+fn last_verdict(
+    folder: &ModelFolder,
+    report: &RunReport,
+    json: bool,
+) -> Result<Option<u8>, Failure> {
+    let Some(bytes) = folder.note(REPORT_NOTE)? else { return Ok(None) };
+    let Ok(last) = serde_json::from_slice::<serde_json::Value>(&bytes) else { return Ok(None) };
+    let same = last["fingerprint"].as_str() == Some(&fingerprint(folder, report));
+    let Some(pass) = last["check"]["pass"].as_bool().filter(|_| same) else { return Ok(None) };
+    if json {
+        say(&serde_json::json!({ "event": "report", "report": last }).to_string())?;
+    } else {
+        let verdict = if pass { "passed" } else { "did not pass" };
+        let (path, time) = (folder.path().display(), duration(report.seconds));
+        say(&format!("{path} is up to date, nothing to do ({time}); its check {verdict}"))?;
+    }
+    Ok(Some(verdict(pass)))
+}
+
+fn show(folder: &ModelFolder, report: &ConversionReport, json: bool) -> Result<(), Failure> {
+    if json {
+        return say(&serde_json::json!({ "event": "report", "report": report }).to_string());
+    }
+    say(&tables::stages(report))?;
+    say("")?;
+    if let Some(topology) = report.topology {
+        say(&format!("topology: {topology}"))?;
+    }
+    say(&tables::check(&report.check, &folder.model().file))?;
+    let path = folder.path().display();
+    say(&format!(
+        "\nartifacts, {MODEL} and {REPORT_NOTE} are in {path}",
+        MODEL = isospline::MODEL_NOTE
+    ))?;
+    say(&format!("to look at it: isospline export {path} --format glb"))
+}
+
+fn verdict(pass: bool) -> u8 {
+    if pass { 0 } else { CHECK_FAILED }
+}

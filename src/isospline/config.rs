@@ -1,0 +1,13 @@
+//! Model files: TOML to typed tables, with places for every complaint.
+
+mod canonical;
+mod document;
+mod error;
+mod model_file;
+mod stage_params;
+mod tables;
+
+pub use document::{Document, Place, Source};
+pub use error::ConfigError;
+pub use model_file::{DEFAULT_FACES, Domain, Inside, ModelFile, ModelTable, TargetTable};
+pub use stage_params::StageParams;

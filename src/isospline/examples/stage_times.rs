@@ -1,0 +1,58 @@
+//! Each stage's time, share and nanoseconds a patch on the decorative cube, at 5 000 and 50 000
+//! faces: `cargo run --release --example stage_times`. The least of several runs, in memory.
+#![expect(clippy::print_stdout, reason = "a table for people")]
+
+use isospline::config::ModelFile;
+use isospline::{Model, Options, convert};
+use std::path::Path;
+
+/// Faces, and runs of which the fastest counts.
+const SIZES: [(u32, usize); 2] = [(5_000, 5), (50_000, 2)];
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/deccube.toml");
+    let model = Model::new(ModelFile::open(&config, &[])?)?;
+    let mut per_patch = Vec::new();
+    for (faces, n_runs) in SIZES {
+        let times = least_times(&model, faces, n_runs)?;
+        let all: f64 = times.iter().map(|t| t.1).sum();
+        println!("{faces} faces, {:.1} ms in stages", 1e3 * all);
+        for (stage, seconds) in &times {
+            let ns = 1e9 * seconds / f64::from(faces);
+            println!(
+                "  {stage:<15}{:>9.2} ms{:>7.1} %{ns:>10.0} ns a patch",
+                1e3 * seconds,
+                100.0 * seconds / all
+            );
+        }
+        per_patch.push(all / f64::from(faces));
+    }
+    println!(
+        "a patch costs {:.2} times as much at {} faces",
+        per_patch[1] / per_patch[0],
+        SIZES[1].0
+    );
+    Ok(())
+}
+
+/// The least time of each stage over all runs, seconds.
+fn least_times(
+    model: &Model,
+    faces: u32,
+    n_runs: usize,
+) -> Result<Vec<(String, f64)>, Box<dyn std::error::Error>> {
+    let mut least: Vec<(String, f64)> = Vec::new();
+    for _ in 0..n_runs {
+        let options =
+            Options { faces, stages: model.file.stages.clone(), ..Options::new(model.domain) };
+        let surface = convert(&model.field, &options)?;
+        for (k, node) in surface.report.nodes.iter().enumerate() {
+            let seconds = node.provenance.as_ref().map_or(f64::NAN, |p| p.cost.seconds);
+            match least.get_mut(k) {
+                Some(slot) => slot.1 = slot.1.min(seconds),
+                None => least.push((node.stage.clone(), seconds)),
+            }
+        }
+    }
+    Ok(least)
+}

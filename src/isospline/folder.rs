@@ -1,0 +1,203 @@
+//! A model folder: artifacts, the canonical model file, the last report.
+
+use crate::config::ModelFile;
+use crate::{Model, ModelError, stages};
+use isospline_artifact::kinds::{Mesh, Patches, Topology, TopologyProof};
+use isospline_artifact::{Artifact, Container, Durability, FolderStore, Store, StoreError};
+use isospline_check::{CheckReport, Expected, ForEach, Job, Surface, SurfaceError};
+use isospline_pipeline::{
+    Event, Graph, ModelKey, NodeStatus, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
+    read_provenance,
+};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Name of the canonical model file.
+pub const MODEL_NOTE: &str = "model.toml";
+/// Name of the last report.
+pub const REPORT_NOTE: &str = "report.json";
+
+/// Why a model folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// There is no model file in it.
+    #[error("{} is not a model folder: it has no {MODEL_NOTE}", path.display())]
+    NotAModel {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Its model is refused.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Its files cannot be read or written.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// Its last artifact is no surface.
+    #[error("the patches do not fit together: {0}")]
+    Surface(#[from] SurfaceError),
+}
+
+/// A model and the folder of its artifacts.
+#[derive(Debug)]
+pub struct ModelFolder {
+    model: Model,
+    key: ModelKey,
+    store: FolderStore,
+    registry: Registry,
+    graph: Graph,
+}
+
+impl ModelFolder {
+    /// The folder at `path`, there or not, of this model.
+    pub fn new(model: Model, path: impl Into<PathBuf>, durability: Durability) -> Self {
+        let registry = stages::registry();
+        let graph = stages::graph(&registry, &model.file.stages, model.base_mesh.as_ref());
+        let (key, store) = (model.key(), FolderStore::new(path, durability));
+        Self { model, key, store, registry, graph }
+    }
+
+    /// The folder at `path` with the model that it holds.
+    ///
+    /// # Errors
+    /// [`FolderError::NotAModel`], or what is wrong with its model.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
+        let file = path.join(MODEL_NOTE);
+        if !file.is_file() {
+            return Err(FolderError::NotAModel { path: path.to_owned() });
+        }
+        let file = ModelFile::open(&file, &[]).map_err(ModelError::from)?;
+        Ok(Self::new(Model::new(file)?, path, Durability::Durable))
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        self.store.folder()
+    }
+
+    /// Makes what is not fresh, after writing the canonical model file.
+    ///
+    /// # Errors
+    /// See [`RunError`]; what was finished is kept.
+    pub fn run(
+        &self,
+        options: &RunOptions<'_>,
+        on_event: &(dyn Fn(&Event) + Sync),
+    ) -> Result<RunReport, RunError> {
+        self.save_model()?;
+        let scene = Scene { field: &self.model.field, domain: self.model.domain };
+        self.pipeline().run(scene, options, on_event)
+    }
+
+    /// State of every stage.
+    ///
+    /// # Errors
+    /// See [`RunError`].
+    pub fn status(&self) -> Result<Vec<NodeStatus>, RunError> {
+        self.pipeline().status()
+    }
+
+    /// The finished surface, all rows verified.
+    ///
+    /// # Errors
+    /// [`StoreError::Missing`], [`StoreError::Damaged`], [`StoreError::Io`].
+    pub fn patches(&self) -> Result<Arc<Container>, StoreError> {
+        let last = self.graph.last_of_kind(&self.registry, Patches::KIND);
+        let node = &self.graph.nodes[last.expect("invariant: every graph ends in patches")];
+        self.store().open(&self.registry.artifact_name(node))
+    }
+
+    /// Measures the finished surface.
+    ///
+    /// # Errors
+    /// [`FolderError::Store`], [`FolderError::Surface`].
+    pub fn check(&self, threads: ForEach<'_>) -> Result<CheckReport, FolderError> {
+        let container = self.patches()?;
+        let surface = Surface::from_patches(&container.view::<Patches>()?)?;
+        let job = Job {
+            surface: &surface,
+            field: &self.model.field,
+            expected: self.expected()?,
+            params: &self.model.file.check,
+            repairs: self.repairs()?,
+        };
+        Ok(isospline_check::check(&job, threads))
+    }
+
+    /// Counters of every fallback that a stage took, as `stage.name`.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn repairs(&self) -> Result<BTreeMap<String, u64>, StoreError> {
+        let mut all = BTreeMap::new();
+        for node in &self.graph.nodes {
+            let artifact = self.registry.artifact_name(node);
+            let Some(record) = read_provenance(self.store(), &artifact)? else { continue };
+            let repairs = record.counters.repairs.into_iter();
+            all.extend(repairs.map(|(name, n)| (format!("{}.{name}", node.label()), n)));
+        }
+        Ok(all)
+    }
+
+    /// How the topology of the first mesh was established; `None` without that mesh.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`], [`StoreError::Io`].
+    pub fn topology(&self) -> Result<Option<(Topology, TopologyProof)>, StoreError> {
+        let first = self.registry.artifact_name(&self.graph.nodes[0]);
+        let Some(container) = self.store().peek(&first)? else { return Ok(None) };
+        container.verify()?;
+        let topology = container.view::<Mesh>()?.topology[0];
+        Ok(TopologyProof::from_code(topology.proof).map(|proof| (topology, proof)))
+    }
+
+    /// Reads a note beside the artifacts.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn note(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        self.store.read_note(name)
+    }
+
+    /// Writes a note beside the artifacts, whole or not at all.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn write_note(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        self.store.write_note(name, bytes)
+    }
+
+    fn expected(&self) -> Result<Expected, StoreError> {
+        let topology = self.topology()?.map(|(topology, _)| topology);
+        Ok(Expected {
+            components: topology.map(|t| t.components),
+            euler_characteristic: topology.map(|t| t.euler_characteristic),
+            tolerance: self.model.file.target.tolerance,
+        })
+    }
+
+    /// Writes the model file where it is not there or differs.
+    fn save_model(&self) -> Result<(), StoreError> {
+        // Taken and freed: a folder that another process works on keeps its model.
+        drop(self.store.lock()?);
+        let text = self.model.file.to_toml();
+        if self.store.read_note(MODEL_NOTE)?.as_deref() == Some(text.as_bytes()) {
+            return Ok(());
+        }
+        self.store.write_note(MODEL_NOTE, text.as_bytes())
+    }
+
+    fn store(&self) -> &dyn Store {
+        &self.store
+    }
+
+    fn pipeline(&self) -> Pipeline<'_> {
+        let (registry, graph) = (&self.registry, &self.graph);
+        Pipeline { registry, graph, model: &self.key, store: &self.store }
+    }
+}

@@ -1,0 +1,138 @@
+//! A model file becomes a field, a box and a base mesh: what the stages work on.
+
+use crate::config::{ConfigError, Domain, Inside, ModelFile};
+use isospline_geometry::Aabb;
+use isospline_implicit::{
+    BoundsError, Field, Formula, FormulaError, InsideError, Oriented, auto_box, resolve_inside,
+};
+use isospline_pipeline::{Given, ModelKey};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Why a model cannot be worked on.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// The model file is refused.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The formula cannot be read.
+    #[error("model.formula: {error}")]
+    Formula {
+        /// The formula.
+        text: String,
+        /// What is wrong with it, and where.
+        error: Box<FormulaError>,
+    },
+    /// No box holds the surface.
+    #[error(transparent)]
+    Box(#[from] BoundsError),
+    /// The side that is solid cannot be told.
+    #[error(transparent)]
+    Inside(#[from] InsideError),
+    /// The base mesh cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    MeshUnreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl ModelError {
+    fn formula(text: &str, error: FormulaError) -> Self {
+        Self::Formula { text: text.to_owned(), error: Box::new(error) }
+    }
+}
+
+/// A model, ready to be converted.
+#[derive(Debug)]
+pub struct Model {
+    /// The file it comes from.
+    pub file: ModelFile,
+    /// The field, level at zero, `f < 0` inside.
+    pub field: Oriented<Formula>,
+    /// The box that holds the surface.
+    pub domain: Aabb,
+    /// The mesh that takes the place of polygonize and decimate.
+    pub base_mesh: Option<Given>,
+}
+
+impl Model {
+    /// Reads formula and base mesh of a model file and finds its box and side.
+    ///
+    /// # Errors
+    /// [`ModelError`].
+    pub fn new(file: ModelFile) -> Result<Self, ModelError> {
+        let model = &file.model;
+        let formula = Formula::parse(&model.formula, &model.parameters)
+            .map_err(|error| ModelError::formula(&model.formula, error))?;
+        let level = Oriented { inner: &formula, level: model.level, flipped: false };
+        let domain = match model.domain.given() {
+            Some(domain) => domain,
+            None => auto_box(&level, model.box_limit)?,
+        };
+        let field = oriented(formula, model.level, model.inside, &domain)?;
+        let base_mesh = None;
+        Ok(Self { file, field, domain, base_mesh })
+    }
+
+    /// What of the model may change the output.
+    ///
+    /// The formula enters as parsed, with its parameters put in: spacing, comments and the names
+    /// of intermediate lines do not count. Parameters stand beside it for the sake of the reader.
+    pub fn key(&self) -> ModelKey {
+        let model = &self.file.model;
+        let sides = [0, 1, 2].map(|k| [self.domain.min[k], self.domain.max[k]]);
+        let mut content = BTreeMap::from([
+            ("formula".to_owned(), self.field.inner.canonical()),
+            ("level".to_owned(), model.level.to_string()),
+            ("box".to_owned(), format!("{sides:?}")),
+            ("sign_turned".to_owned(), self.field.flipped.to_string()),
+        ]);
+        for (name, value) in &model.parameters {
+            content.insert(format!("parameters.{name}"), value.to_string());
+        }
+        ModelKey { name: model.name.clone(), content, hashable: true }
+    }
+
+    /// What the user is to know of how the model was read: a box that was found, a sign turned.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.file.model.domain == Domain::Auto {
+            let (min, max) = (self.domain.min, self.domain.max);
+            let sides = [0, 1, 2].map(|k| format!("[{:.4}, {:.4}]", min[k], max[k]));
+            remarks.push(format!("model.box is auto: found [{}]", sides.join(", ")));
+        }
+        if self.field.flipped && self.file.model.inside == Inside::Auto {
+            let remark = "model.inside is auto: positive values are inside, the sign is turned";
+            remarks.push(remark.to_owned());
+        }
+        remarks
+    }
+}
+
+/// `field - level`, turned so that `f < 0` inside.
+///
+/// # Errors
+/// [`InsideError`] if the field is not a number or changes its sign on the border of the box.
+pub(crate) fn oriented<F: Field>(
+    field: F,
+    level: f64,
+    inside: Inside,
+    domain: &Aabb,
+) -> Result<Oriented<F>, InsideError> {
+    let unturned = Oriented { inner: field, level, flipped: false };
+    let flipped = resolve_inside(&unturned, domain, inside.into())?;
+    Ok(Oriented { flipped, ..unturned })
+}
+
+impl From<Inside> for isospline_implicit::Inside {
+    fn from(inside: Inside) -> Self {
+        match inside {
+            Inside::Auto => Self::Auto,
+            Inside::Negative => Self::Negative,
+            Inside::Positive => Self::Positive,
+        }
+    }
+}
