@@ -9,6 +9,8 @@ mod erase;
 pub mod error;
 pub mod event;
 mod execute;
+#[cfg(test)]
+mod faulty;
 mod finisher;
 pub mod freshness;
 pub mod graph;

@@ -1,5 +1,6 @@
 //! What a run promises: bytes, order, failures, interruptions.
 
+use crate::faulty::FaultyStore;
 use crate::toys::{Bench, FILES, Fault, NoField, all_bytes};
 use crate::{Event, Outcome, RunError, RunOptions, Scene, State, read_provenance};
 use isospline_artifact::{Durability, FolderStore, MemoryStore, Store, StoreError};
@@ -287,4 +288,27 @@ fn the_record_is_the_one_of_the_report() {
         assert_eq!(record.content, node.content);
         assert_eq!(record.inputs.len(), node.node);
     }
+}
+
+#[test]
+fn a_fault_at_any_operation_of_the_store_is_reported_and_repaired_by_the_next_run() {
+    let bench = Bench::new();
+    let expected = all_bytes(&bench.stored());
+    let mut faults = 0;
+    for k in 1.. {
+        let kept = MemoryStore::new();
+        let (result, _) = bench.run(&FaultyStore::new(kept.clone(), k), &options(2, 40));
+        let Err(error) = result else {
+            break;
+        };
+        faults += 1;
+        assert!(error.to_string().ends_with("injected"), "{k}: {error}");
+        for file in all_bytes(&kept) {
+            assert!(expected.contains(&file), "{k}: {} is not what it should be", file.0);
+        }
+        bench.run(&kept, &RunOptions::default()).0.unwrap();
+        assert!(all_bytes(&kept) == expected, "{k}");
+    }
+    // Three stages with, at the least, create, header, rows, map, footer, map, note, rename, sync.
+    assert!(faults > 27, "{faults} faults");
 }
