@@ -9,18 +9,18 @@ use thiserror::Error;
 
 /// Free space beside the zero set on each side, as a part of the box: the models of MATH.md have
 /// about 10 %.
-const MARGIN_REL: f64 = 0.09;
+const MARGIN_REL: f64 = 0.08;
 
 /// How far the zero set may turn out smaller than the box without margin, on each side: makes the
-/// true margin 9 to 12 %. Half of it costs twice the cells.
-const SLACK_REL: f64 = 0.03;
+/// true margin 8 to 12 %. Half of it costs twice the cells.
+const SLACK_REL: f64 = 0.04;
 
 /// Cells that may be looked at: ten times what the models of the paper need, below 100 ms.
 const MAX_CELLS: usize = 60_000;
 
-/// Depth from which a cell counts as empty whose enclosure is unknown and whose samples have no
-/// change of sign: the field is undefined there.
-const UNDEFINED_DEPTH: u32 = 6;
+/// Depths from which a cell of unknown enclosure counts as empty: if all its samples are NaN, and
+/// if none differ in sign. Without them the border of a field's domain would count as surface.
+const UNDEFINED_DEPTHS: [u32; 2] = [6, 18];
 
 /// Points a side of the first grid of samples, 0.1 ms for deccube: where it meets the set, the
 /// search knows from the start how exact it has to be.
@@ -78,7 +78,7 @@ pub enum BoundsError {
     },
 }
 
-/// A box around the zero set of `field` inside of `[-limit, limit]^3`, with a margin of 9 to 12 %
+/// A box around the zero set of `field` inside of `[-limit, limit]^3`, with a margin of 8 to 12 %
 /// of its size on every side.
 ///
 /// # Errors
@@ -101,7 +101,7 @@ pub fn auto_box(field: &dyn Field, limit: f64) -> Result<Aabb, BoundsError> {
         return Err(BoundsError::Limit { limit });
     }
     let corner = Vec3::repeat(limit);
-    let whole = Cell { aabb: Aabb::new(-corner, corner), depth: 0 };
+    let whole = Cell { aabb: Aabb::new(-corner, corner), depth: 0, axis: 0 };
     let mut search = Search::new(field, whole);
     search.seed(&whole.aabb);
     for side in Side::ALL {
@@ -115,18 +115,17 @@ pub fn auto_box(field: &dyn Field, limit: f64) -> Result<Aabb, BoundsError> {
 struct Cell {
     aabb: Aabb,
     depth: u32,
+    /// The axis along which f varies most, to be halved next.
+    axis: usize,
 }
 
 impl Cell {
-    fn octants(&self) -> [Self; 8] {
-        let Aabb { min, max } = self.aabb;
-        let middle = self.aabb.center();
-        std::array::from_fn(|k| {
-            let upper = |axis: usize| k >> axis & 1 == 1;
-            let low = Vec3::from_fn(|axis, _| if upper(axis) { middle[axis] } else { min[axis] });
-            let high = Vec3::from_fn(|axis, _| if upper(axis) { max[axis] } else { middle[axis] });
-            Self { aabb: Aabb::new(low, high), depth: self.depth + 1 }
-        })
+    fn halves(&self) -> [Self; 2] {
+        let middle = 0.5 * (self.aabb.min[self.axis] + self.aabb.max[self.axis]);
+        let mut halves = [Self { depth: self.depth + 1, ..*self }; 2];
+        halves[0].aabb.max[self.axis] = middle;
+        halves[1].aabb.min[self.axis] = middle;
+        halves
     }
 }
 
@@ -218,8 +217,8 @@ impl<'a> Search<'a> {
                 heap.push(farthest);
                 break;
             }
-            for cell in farthest.cell.octants() {
-                if self.may_hold_zero(&cell, side)? {
+            for mut cell in farthest.cell.halves() {
+                if self.may_hold_zero(&mut cell, side)? {
                     heap.push(rank(cell));
                 }
             }
@@ -236,47 +235,61 @@ impl<'a> Search<'a> {
         side.reach(&self.proven) + SLACK_REL * self.proven.size()[side.axis()]
     }
 
-    fn may_hold_zero(&mut self, cell: &Cell, side: Side) -> Result<bool, BoundsError> {
-        self.n_seen += 1; #[cfg(test)] N.with(|n| n.set(self.n_seen));
-        let domain = std::array::from_fn(|k| Interval::new(cell.aabb.min[k], cell.aabb.max[k]));
-        let value = self.enclosure(domain).ok_or(BoundsError::NoIntervals)?;
+    fn may_hold_zero(&mut self, cell: &mut Cell, side: Side) -> Result<bool, BoundsError> {
+        self.n_seen += 1;
+        let domain: [Interval; 3] =
+            std::array::from_fn(|k| Interval::new(cell.aabb.min[k], cell.aabb.max[k]));
+        let value = self.field.value_enclosure(domain).ok_or(BoundsError::NoIntervals)?;
         if !value.may_be_zero() {
             return Ok(false);
         }
-        let changes_sign = self.sample(&cell.aabb, side);
-        let undefined = value.is_unknown() && !changes_sign;
-        Ok(!(undefined && cell.depth >= UNDEFINED_DEPTH))
+        let slopes =
+            self.field.gradient_enclosure(domain).ok_or(BoundsError::NoIntervals)?.gradient;
+        let mean = self.mean_value_form(domain, slopes).ok_or(BoundsError::NoIntervals)?;
+        if !mean.may_be_zero() {
+            return Ok(false);
+        }
+        cell.axis = steepest_axis(domain, slopes);
+        let sample = self.sample(&cell.aabb, side);
+        let undefined_depth = match sample {
+            _ if !value.is_unknown() => u32::MAX,
+            Sample::ChangesSign => u32::MAX,
+            Sample::Undefined => UNDEFINED_DEPTHS[0],
+            Sample::OneSign => UNDEFINED_DEPTHS[1],
+        };
+        Ok(cell.depth < undefined_depth)
     }
 
-    /// The cheap enclosure where it suffices.
-    fn enclosure(&self, domain: [Interval; 3]) -> Option<Interval> {
-        let value = self.field.value_enclosure(domain)?;
-        if value.may_be_zero() { self.field.tight_value_enclosure(domain) } else { Some(value) }
+    /// As in [`Field::tight_value_enclosure`], from known slopes.
+    fn mean_value_form(&self, domain: [Interval; 3], slopes: [Interval; 3]) -> Option<Interval> {
+        let center = domain.map(|side| Interval::point(side.midpoint()));
+        let parts = (0..3).map(|k| slopes[k] * (domain[k] - center[k]));
+        Some(parts.fold(self.field.value_enclosure(center)?, |sum, part| sum + part))
     }
 
-    /// Whether the values at the centre and the corners have both signs; the zero between those
-    /// nearest to `side` is noted.
-    fn sample(&mut self, cell: &Aabb, side: Side) -> bool {
+    /// The signs at the centre and the corners; the zero between those nearest to `side` is noted.
+    fn sample(&mut self, cell: &Aabb, side: Side) -> Sample {
         let corner = |k: usize| Vec3::from_fn(|axis, _| [cell.min, cell.max][k >> axis & 1][axis]);
         let points: [Vec3; 9] =
             std::array::from_fn(|k| if k < 8 { corner(k) } else { cell.center() });
         let mut values = [0.0; 9];
         self.field.values(&points, &mut values);
+        if values.iter().all(|value| value.is_nan()) {
+            return Sample::Undefined;
+        }
         self.note(&points, &values);
-        let farthest = |negative: bool| {
-            let of_sign = (0..9).filter(|&k| values[k] != 0.0 && (values[k] < 0.0) == negative);
+        let farthest = |sign: f64| {
             let reach = |k: &usize| side.reach(&Aabb::new(points[*k], points[*k]));
+            let of_sign = (0..9).filter(|&k| sign * values[k] > 0.0);
             of_sign.max_by(|a, b| reach(a).total_cmp(&reach(b)))
         };
-        // NaN has no sign: it is neither below zero nor, by this test, above.
-        let (Some(low), Some(high)) = (farthest(true), farthest(false)) else { return false };
-        if values[high].is_nan() {
-            return false;
-        }
+        let (Some(low), Some(high)) = (farthest(-1.0), farthest(1.0)) else {
+            return Sample::OneSign;
+        };
         if side.reach(cell) > side.reach(&self.proven) {
             self.prove(points[low], points[high], values[low]);
         }
-        true
+        Sample::ChangesSign
     }
 
     fn note(&mut self, points: &[Vec3], values: &[f64]) {
@@ -331,6 +344,22 @@ impl<'a> Search<'a> {
         let margin = MARGIN_REL * result.size();
         Ok(Aabb::new(result.min - margin, result.max + margin))
     }
+}
+
+/// Signs of the samples of a cell.
+#[derive(Clone, Copy)]
+enum Sample {
+    Undefined,
+    OneSign,
+    ChangesSign,
+}
+
+/// Where halving lowers the variation of f most; the longest axis where slopes are unbounded.
+fn steepest_axis(domain: [Interval; 3], slopes: [Interval; 3]) -> usize {
+    let variation = |k: usize| domain[k].width() * slopes[k].lo.abs().max(slopes[k].hi.abs());
+    let bounded = (0..3).all(|k| variation(k).is_finite());
+    let weight = |k: &usize| if bounded { variation(*k) } else { domain[*k].width() };
+    (0..3).max_by(|a, b| weight(a).total_cmp(&weight(b))).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -392,8 +421,3 @@ mod tests {
         assert_eq!(auto_box(&closure, 8.0), Err(BoundsError::NoIntervals));
     }
 }
-
-#[cfg(test)] mod timing { #[test] fn t() { use std::time::Instant; for (t,l) in [("a=0.8;((x^2+y^2-a^2)^2+(z^2-1)^2)*((y^2+z^2-a^2)^2+(x^2-1)^2)*((z^2+x^2-a^2)^2+(y^2-1)^2)-0.02",10.0),("a=0.8;((x^2+y^2-a^2)^2+(z^2-1)^2)*((y^2+z^2-a^2)^2+(x^2-1)^2)*((z^2+x^2-a^2)^2+(y^2-1)^2)-0.02",1000.0),("x^8-2*x^6+x^4+2*x^4*y^2-2*x^2*y^2+y^4+z^2-0.04",10.0),
-("k=5;(x^2+y^2+z^2-0.95*k^2)^2-0.8*((z-k)^2-2*x^2)*((z+k)^2-2*y^2)",6.0),("k=5;(x^2+y^2+z^2-0.95*k^2)^2-0.8*((z-k)^2-2*x^2)*((z+k)^2-2*y^2)",10.0),("(x^2+1)*(y^2+1)*(z^2+1)+8*x*y*z-2",2.0),("sqrt(max(abs(x)-1,0)^2+max(abs(y)-1,0)^2+max(abs(z)-1,0)^2)+min(max(abs(x)-1,max(abs(y)-1,abs(z)-1)),0)",10.0),("x^2+y^2+z^2",10.0),("x+y+z",10.0)] {
- let f=crate::Formula::parse(t,&Default::default()).unwrap(); let s=Instant::now(); let r=super::auto_box(&f,l); println!("{:?} {:?} {}",s.elapsed(),r, super::N.with(|n| n.take())); } } }
-#[cfg(test)] thread_local!{ static N: std::cell::Cell<usize> = const { std::cell::Cell::new(0) }; }

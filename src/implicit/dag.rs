@@ -201,9 +201,21 @@ impl Dag {
         }
     }
 
+    /// Arguments in the order of [`Self::rank`]: one node for both orders, and the same one
+    /// whenever the leaves were first seen, so that canonical text reads as itself.
     fn commutative(&mut self, op: BinaryOp, a: NodeId, b: NodeId) -> NodeId {
         debug_assert!(op.is_commutative());
-        self.intern(Node::Binary(op, a.min(b), a.max(b)))
+        let (first, second) = if self.rank(a) <= self.rank(b) { (a, b) } else { (b, a) };
+        self.intern(Node::Binary(op, first, second))
+    }
+
+    /// Constants by bits, variables by axis, then the other nodes in the order they were made.
+    fn rank(&self, id: NodeId) -> (u8, u64) {
+        match self.node(id) {
+            Node::Constant(bits) => (0, bits),
+            Node::Variable(axis) => (1, axis.into()),
+            _ => (2, id.0.into()),
+        }
     }
 
     /// `a^n` for a constant integer.

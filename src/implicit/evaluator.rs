@@ -258,3 +258,69 @@ impl<const N: usize> Row<'_, N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dag::NodeId;
+    use crate::lowering::{Target, lower};
+
+    /// A tape with every operation that has a kernel of its own.
+    fn tape() -> Tape {
+        let text = "a = 3*x + y*z - 2; b = x*y - z*x; c = 5 - a; d = 1/(b^2 + 1)
+            s = smin(a, b, 0.5) + sqrt(abs(c)) + sign(x)*d - min(x, max(y, z))
+            clamp(a*b - c, -1, 1) + s/a + floor(x)*sin(y) + x^3*atan2(y, x) - x^1.5*exp(-z)";
+        let (mut dag, root) =
+            crate::parser::parse(text, &std::collections::BTreeMap::new()).unwrap();
+        let n_values = dag.n_nodes();
+        let first = crate::derivative::gradient(&mut dag, root);
+        let second = crate::derivative::hessian(&mut dag, first);
+        let roots: Vec<NodeId> = [root].into_iter().chain(first).chain(second).collect();
+        let (low, roots) = lower(&dag, &roots, n_values, Target::Points);
+        Tape::new(&low, &roots, Target::Points)
+    }
+
+    fn points(n: usize) -> Vec<Vec3> {
+        let at = |i: usize, step: f64| 4.0 * (i as f64 * step).fract() - 2.0;
+        (0..n).map(|i| Vec3::new(at(i, 0.819), at(i, 0.671), at(i, 0.549))).collect()
+    }
+
+    fn results(tape: &Tape, points: &[Vec3]) -> Vec<[u64; 10]> {
+        let mut out = vec![[0; 10]; points.len()];
+        // NaN payloads may differ: they are not data.
+        let bits = |f: f64| if f.is_nan() { u64::MAX } else { f.to_bits() };
+        evaluate(tape, points, &mut out, |all: [f64; 10]| all.map(bits));
+        out
+    }
+
+    #[test]
+    fn results_do_not_depend_on_neighbours_in_the_batch() {
+        let (tape, points) = (tape(), points(203));
+        let together = results(&tape, &points);
+        for (point, expected) in points.iter().zip(&together) {
+            assert_eq!(results(&tape, &[*point])[0], *expected);
+        }
+        for n in [7, 15, 45, 100] {
+            assert_eq!(results(&tape, &points[..n]), together[..n]);
+        }
+    }
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn avx2_and_plain_code_agree_in_all_bits() {
+        if !std::arch::is_x86_feature_detected!("avx2") {
+            return;
+        }
+        let tape = tape();
+        let start: Vec<[f64; 32]> = (0..tape.n_registers)
+            .map(|k| points(32 * (k + 1))[32 * k..].iter().map(|p| p.x).collect::<Vec<_>>())
+            .map(|lanes| lanes.try_into().unwrap())
+            .collect();
+        let (mut plain, mut vector) = (start.clone(), start);
+        interpret(&tape.instructions, &mut plain);
+        run(&tape.instructions, &mut vector);
+        for (a, b) in plain.as_flattened().iter().zip(vector.as_flattened()) {
+            assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()), "{a:e} {b:e}");
+        }
+    }
+}

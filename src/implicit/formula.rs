@@ -83,8 +83,8 @@ impl Formula {
         })
     }
 
-    /// The formula with parameters put in, one operation a line, as a formula again: equal for
-    /// formulas that differ in spacing, comments, names or repetitions only. For hashing.
+    /// The formula with parameters put in, one operation a line, as a formula again. Spacing,
+    /// comments, names and repetitions leave it alone; the order of terms does not. For hashing.
     pub fn canonical(&self) -> String {
         canonical::canonical(&self.dag, self.root)
     }

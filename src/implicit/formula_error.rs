@@ -31,7 +31,8 @@ pub struct FormulaError {
     pub line: usize,
     /// Column of the start in characters, from 1.
     pub column: usize,
-    excerpt: Excerpt,
+    // Boxed to keep results small.
+    excerpt: Box<Excerpt>,
 }
 
 /// Causes of a [`FormulaError`].
@@ -221,7 +222,7 @@ impl FormulaError {
             kind,
             line: before.matches('\n').count() + 1,
             column: column + 1,
-            excerpt: Excerpt::new(line_text, column, width),
+            excerpt: Box::new(Excerpt::new(line_text, column, width)),
             span,
         }
     }

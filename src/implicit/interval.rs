@@ -244,6 +244,7 @@ fn is_exact(a: f64, b: f64, product: f64) -> bool {
 
 /// A lower bound of `a / b` for `b > 0`.
 #[inline]
+#[expect(clippy::float_cmp, reason = "whether a quotient is exact is a question of bits")]
 fn div_down(a: f64, b: f64) -> f64 {
     if a == 0.0 {
         return 0.0;

@@ -79,8 +79,9 @@ impl Interval {
             UnaryOp::Asin if self.is_within_one() => self.increasing(op),
             UnaryOp::Acos if self.is_within_one() => self.decreasing(op).within(0.0, 4.0),
             UnaryOp::Cosh => self.abs().increasing(op).within(1.0, f64::INFINITY),
-            UnaryOp::BlendGap => self.abs().decreasing(op).within(0.0, 1.0),
-            UnaryOp::BlendCurvature => self.abs().decreasing(op).within(0.0, 1.0),
+            UnaryOp::BlendGap | UnaryOp::BlendCurvature => {
+                self.abs().decreasing(op).within(0.0, 1.0)
+            }
             UnaryOp::Sin => self.circular(op, 0.25),
             UnaryOp::Cos => self.circular(op, 0.0),
             UnaryOp::Tan => self.tan(),
@@ -184,7 +185,7 @@ impl Interval {
     /// `{a^b}`.
     fn pow(self, b: Self) -> Self {
         let a = self;
-        let exponent = if b.lo == b.hi { Some(b.lo) } else { None };
+        let exponent = (b.lo >= b.hi).then_some(b.lo);
         if a.lo > 0.0 || (a.lo == 0.0 && b.lo > 0.0) {
             // Monotone in each argument, so extreme in the corners.
             return corners(BinaryOp::Pow, a, b).within(0.0, f64::INFINITY);

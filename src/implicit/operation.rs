@@ -180,7 +180,7 @@ fn positive_power(a: f64, n: u32) -> f64 {
     match n {
         0 => 1.0,
         1 => a,
-        _ if n % 2 == 0 => {
+        _ if n.is_multiple_of(2) => {
             let root = positive_power(a, n / 2);
             root * root
         }

@@ -89,10 +89,8 @@ impl<'a> Parser<'a> {
             }
             self.end_of_line()?;
         }
-        let nothing =
-            if self.at == 0 || self.names.is_empty() { Kind::Empty } else { Kind::NoValue };
         let defined = self.tokens.iter().any(|token| token.kind == TokenKind::Equals);
-        let missing = if defined { Kind::NoValue } else { nothing };
+        let missing = if defined { Kind::NoValue } else { Kind::Empty };
         value.map(|(id, _)| id).ok_or_else(|| self.error(missing, self.span()))
     }
 
