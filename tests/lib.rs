@@ -58,14 +58,19 @@ impl Sandbox {
         path
     }
 
+    /// The program, to be run in the folder.
+    pub fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(program());
+        command.args(args).current_dir(self.folder.path()).env("NO_COLOR", "1");
+        command
+    }
+
     /// Runs the program in the folder.
     ///
     /// # Panics
     /// If it cannot be built or started.
     pub fn isospline(&self, args: &[&str]) -> Outcome {
-        let mut command = Command::new(program());
-        command.args(args).current_dir(self.folder.path()).env("NO_COLOR", "1");
-        let output = command.output().expect("the program starts");
+        let output = self.command(args).output().expect("the program starts");
         Outcome {
             code: output.status.code().unwrap_or(-1),
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),

@@ -1,0 +1,172 @@
+//! The commands as the README promises them.
+
+use isospline_tests::{Sandbox, config_path, root};
+use std::io::Read;
+use std::process::Stdio;
+
+const SMALL: [&str; 2] = ["--set", "target.faces=300"];
+
+#[test]
+fn a_formula_alone_becomes_a_surface() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "--formula", "x^2 + 2*y^2 + z^2 - 1", "--set", "target.faces=200"];
+    let outcome = sandbox.succeeds(&args);
+    assert!(outcome.stderr.contains("model.box is auto"), "{}", outcome.stderr);
+    assert!(outcome.stdout.contains("check passed"), "{}", outcome.stdout);
+    assert!(sandbox.path("out/formula/model.toml").is_file());
+}
+
+#[test]
+fn a_turned_sign_gives_the_same_surface_and_is_told() {
+    let faces = "target.faces=200";
+    let run = |formula: &str| {
+        let sandbox = Sandbox::new();
+        let outcome = sandbox.succeeds(&["run", "--formula", formula, "--set", faces, "--out", "out"]);
+        (sandbox, outcome.stderr)
+    };
+    let (plain, _) = run("x^2 + y^2 + z^2 - 1");
+    let (turned, told) = run("1 - x^2 - y^2 - z^2");
+    assert!(told.contains("the sign is turned"), "{told}");
+    let error = |sandbox: &Sandbox| sandbox.checked()["rel_error_max"].clone();
+    assert_eq!(error(&plain), error(&turned));
+}
+
+#[test]
+fn a_folder_is_checked_without_its_model_file() {
+    let sandbox = Sandbox::new();
+    let config = std::fs::read_to_string(config_path("torus")).unwrap();
+    let model = sandbox.write("torus.toml", config);
+    let args = ["run", "torus.toml", "--out", "out", "--no-sync", SMALL[0], SMALL[1]];
+    sandbox.succeeds(&args);
+    std::fs::remove_file(model).unwrap();
+    let report = sandbox.checked();
+    for figure in [
+        "faces",
+        "vertices",
+        "euler_characteristic",
+        "components",
+        "genus",
+        "gap_max",
+        "g1_angle_deg_max",
+        "g1_angle_deg_p99",
+        "rel_error_max",
+        "rel_error_rms",
+        "normal_error_deg_max",
+        "flipped_patches",
+        "vertex_error_max",
+        "lambda0_out_of_range",
+        "repairs",
+        "pass",
+    ] {
+        assert!(!report[figure].is_null(), "{figure} in {report}");
+    }
+}
+
+#[test]
+fn an_npz_export_has_the_figures_of_its_folder() {
+    let sandbox = Sandbox::new();
+    sandbox.converts("torus", &SMALL);
+    sandbox.succeeds(&["export", "out", "--format", "npz", "-o", "torus.npz"]);
+    let config = config_path("torus");
+    let outcome =
+        sandbox.isospline(&["check", "torus.npz", "--model", config.as_str(), "--json"]);
+    let npz: serde_json::Value = serde_json::from_str(&outcome.stdout).unwrap();
+    let mut folder = sandbox.checked();
+    // Repairs are counted by stages; an export does not hold them.
+    folder["repairs"] = npz["repairs"].clone();
+    assert_eq!(folder, npz);
+    let alone = sandbox.isospline(&["check", "torus.npz"]);
+    assert_eq!(alone.code, 2, "{}", alone.stderr);
+}
+
+#[test]
+fn every_format_is_written_where_it_is_asked_for() {
+    let sandbox = Sandbox::new();
+    sandbox.converts("torus", &SMALL);
+    for format in ["vtu", "glb", "obj", "ply", "stl", "npz"] {
+        sandbox.succeeds(&["export", "out", "--format", format]);
+        let default = std::fs::read(sandbox.path(&format!("out/torus.{format}"))).unwrap();
+        let file = format!("elsewhere.{format}");
+        sandbox.succeeds(&["export", "out", "--format", format, "-o", &file, "--samples", "8"]);
+        assert!(std::fs::read(sandbox.path(&file)).unwrap() == default, "{format}");
+    }
+    let lost = sandbox.isospline(&["export", "out", "--format", "stl", "-o", "no/such/a.stl"]);
+    assert_eq!(lost.code, 33, "{}", lost.stderr);
+}
+
+#[test]
+fn inspect_tells_what_an_artifact_holds() {
+    let sandbox = Sandbox::new();
+    sandbox.converts("torus", &SMALL);
+    let told = sandbox.succeeds(&["inspect", "--verify", "out/07-network.isos"]).stdout;
+    for word in ["kind       network", "control", "\"samples\":17", "curve_iterations", "checksums"] {
+        assert!(told.contains(word), "no {word:?} in\n{told}");
+    }
+}
+
+#[test]
+fn a_check_that_fails_exits_with_1_and_says_which_limit() {
+    let sandbox = Sandbox::new();
+    let args = ["--set", "check.error=1e-12", SMALL[0], SMALL[1]];
+    let config = config_path("torus");
+    let run = [&["run", config.as_str(), "--out", "out"], &args[..]].concat();
+    let outcome = sandbox.isospline(&run);
+    assert_eq!(outcome.code, 1, "{}", outcome.stderr);
+    assert!(outcome.stdout.contains("FAILED: rel_error_max"), "{}", outcome.stdout);
+    assert_eq!(sandbox.isospline(&run).code, 1, "the second run forgets that the check failed");
+    assert_eq!(sandbox.isospline(&["check", "out"]).code, 1);
+}
+
+#[test]
+fn json_output_is_one_value_a_line_to_the_end() {
+    let sandbox = Sandbox::new();
+    let config = config_path("torus");
+    let run = ["run", config.as_str(), "--json", "--out", "out", SMALL[0], SMALL[1]];
+    let lines = |text: &str| -> Vec<serde_json::Value> {
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    let done = lines(&sandbox.succeeds(&run).stdout);
+    let last = done.last().unwrap();
+    assert_eq!(last["event"], "report");
+    assert_eq!(last["report"]["check"]["pass"], true);
+    assert_eq!(last["report"]["stages"].as_array().unwrap().len(), 10);
+
+    let failed = lines(&sandbox.isospline(&["run", "nothing.toml", "--json"]).stdout);
+    assert_eq!(failed.last().unwrap()["code"], "model-file-unreadable");
+    assert_eq!(failed.last().unwrap()["exit"], 10);
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_panic() {
+    let sandbox = Sandbox::new();
+    let config = config_path("torus");
+    let mut child = sandbox
+        .command(&["run", config.as_str(), "--json", "--out", "out", SMALL[0], SMALL[1]])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let mut told = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut told).unwrap();
+    assert!(child.wait().unwrap().success(), "{told}");
+    assert!(!told.contains("panic"), "{told}");
+}
+
+#[test]
+fn help_has_examples_and_the_exit_codes_of_the_readme() {
+    let sandbox = Sandbox::new();
+    for command in ["run", "stage", "status", "inspect", "check", "export"] {
+        let help = sandbox.succeeds(&[command, "--help"]).stdout;
+        assert!(help.contains(&format!("isospline {command} ")), "{help}");
+        assert!(help.contains("Example"), "{help}");
+    }
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let help = sandbox.succeeds(&["--help"]).stdout;
+    let codes: Vec<&str> =
+        help.lines().skip_while(|line| !line.starts_with("Exit codes")).skip(1).collect();
+    assert!(codes.len() > 15, "{help}");
+    for code in codes {
+        assert!(readme.contains(code.trim()), "README.md lacks: {code}");
+    }
+}
