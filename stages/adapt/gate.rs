@@ -7,6 +7,9 @@ use crate::vertex::Vertex;
 /// all sector angles, seen along the normal, lie in (0, 180) degrees; the rest is margin.
 const COS_FOLD: f64 = 0.02;
 
+/// Badness of a folded face; edges reach 4.
+const FOLDED: f64 = 10.0;
+
 /// The thresholds. Every figure is scaled so that 1 is the limit and larger is worse.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gate {
@@ -35,7 +38,9 @@ impl Gate {
     pub(crate) fn face(&self, corners: &[&Vertex; 3]) -> f64 {
         let [a, b, c] = corners;
         let edges = self.edge(a, b).max(self.edge(b, c)).max(self.edge(c, a));
-        edges.max((1.0 - cos_tilt(corners)) / (1.0 - COS_FOLD))
+        let cos_tilt = cos_tilt(corners);
+        // Worse than any edge: no edit may fold a face to save an edge, or repairs run away.
+        edges.max(if cos_tilt < COS_FOLD { FOLDED * (1.0 - cos_tilt) } else { 0.0 })
     }
 
     /// [`Self::face`], raised towards 1, never beyond, for slivers: quality alone does not make a

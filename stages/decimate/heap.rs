@@ -65,6 +65,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
+
         #[test]
         fn words_come_out_sorted(start in prop::collection::vec(0u64..50, 0..40),
                                  more in prop::collection::vec(0u64..50, 0..40)) {

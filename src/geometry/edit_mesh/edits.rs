@@ -229,6 +229,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
+
         #[test]
         fn random_edits_keep_manifold_and_genus(
             edits in prop::collection::vec((0u8..6, any::<u32>()), 1..120)

@@ -4,7 +4,7 @@ use isospline_artifact::kinds::{Mesh, TopologyProof};
 use isospline_decimate::{Decimate, DecimateError, DecimateParams};
 use isospline_geometry::{TriangleMesh, Vec3};
 use isospline_implicit::{ClosureField, Field};
-use isospline_stage::{Ctx, Host, Piece, Serial, Stage, Stopped, Task};
+use isospline_stage::{Ctx, Host, Piece, Serial, Stage, Stopped, Task, contract, stage_contract};
 
 const TAU: f64 = std::f64::consts::TAU;
 
@@ -174,3 +174,12 @@ fn a_stop_signal_ends_the_work() {
     let error = decimate_with(&Impatient, &field, &fine, &params).unwrap_err();
     assert_eq!(error, DecimateError::Stopped(Stopped));
 }
+
+fn contract_fixture() -> contract::Fixture<Decimate> {
+    let mesh = torus_mesh(40, 20, Vec3::zeros());
+    let input = Mesh::from_triangles(&mesh, TopologyProof::Observed).unwrap();
+    let params = DecimateParams { faces: 300, ..DecimateParams::default() };
+    contract::Fixture::new(torus_field(), mesh.bounds()).with_params(params).with_input(input)
+}
+
+stage_contract!(Decimate, contract_fixture);
