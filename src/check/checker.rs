@@ -1,12 +1,14 @@
 //! The whole check, figure by figure.
 
-use crate::distance::{self, first_order};
+use crate::continuity::{self, Continuity};
+use crate::distance::{self, Distance, first_order};
 use crate::lent_threads::{ForEach, map};
 use crate::params::{CheckParams, Expected};
-use crate::report::{CheckReport, worse};
+use crate::report::{CheckReport, Place, worse};
+use crate::sector::{self, Weights};
 use crate::surface::Surface;
 use crate::topology::Topology;
-use crate::{continuity, foot, sector, verdict};
+use crate::{foot, verdict};
 use isospline_geometry::Vec3;
 use isospline_implicit::{Field, Jet1};
 use std::collections::BTreeMap;
@@ -47,47 +49,74 @@ pub fn check(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
 
 fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
     let Job { surface, field, .. } = *job;
-    let diagonal = surface.diagonal();
     let topology = Topology::of(surface);
-    let continuity = continuity::measure(surface, &topology, for_each);
-    let distance = distance::measure(surface, field, for_each);
-    let worst = foot::largest(surface, field, &distance);
     let at_vertices = vertex_jets(surface, field, for_each);
     let normals: Vec<Vec3> = at_vertices.iter().map(|jet| jet.gradient).collect();
-    let weights = sector::measure(surface, &topology, &normals);
-    let off_surface = at_vertices.iter().fold(0.0, |acc, jet| worse(acc, first_order(jet)));
-    let loose = at_vertices.iter().filter(|jet| !first_order(jet).is_finite()).count() as u64;
-    CheckReport {
-        faces: surface.faces().len() as u64,
-        vertices: surface.vertices().len() as u64,
-        euler_characteristic: topology.euler_characteristic(surface),
-        components: topology.components.len() as u32,
-        genus: topology.components.iter().map(|c| c.genus).sum(),
-        edge_defects: topology.defects,
-        component_list: topology.components,
-        diagonal,
-        gap_max: continuity.gap / diagonal,
-        shared_bits_differ: continuity.bits_differ,
-        g1_angle_deg_max: continuity.angle_deg_max,
-        g1_angle_deg_p99: continuity.angle_deg_p99,
-        rel_error_max: worst.map_or(f64::NAN, |(d, _)| d / diagonal),
-        rel_error_grid_max: distance.max / diagonal,
-        rel_error_rms: distance.rms / diagonal,
-        rel_error_mean: distance.mean / diagonal,
-        normal_error_deg_max: distance.normal_deg_max,
-        flipped_patches: distance.flipped,
-        degenerate_normals: distance.degenerate + continuity.degenerate_normals,
-        vertex_error_max: worse(off_surface, continuity.corner_gap) / diagonal,
-        lambda0_out_of_range: weights.out_of_range,
-        lambda0_min: weights.min,
-        lambda0_max: weights.max,
-        not_finite: count_not_finite(surface) + distance.not_finite + loose,
-        repairs: job.repairs.clone(),
-        worst_error: worst.map(|(d, place)| crate::Place { value: d / diagonal, ..place }),
-        worst_g1_angle: continuity.worst_angle,
-        worst_normal: distance.worst_normal,
-        pass: false,
-        failures: Vec::new(),
+    let distance = distance::measure(surface, field, for_each);
+    let parts = Parts {
+        continuity: continuity::measure(surface, &topology, for_each),
+        worst: foot::largest(surface, field, &distance),
+        weights: sector::measure(surface, &topology, &normals),
+        off_surface: at_vertices.iter().fold(0.0, |acc, jet| worse(acc, first_order(jet))),
+        not_finite: count_not_finite(surface)
+            + distance.not_finite
+            + at_vertices.iter().filter(|jet| !first_order(jet).is_finite()).count() as u64,
+        distance,
+        topology,
+    };
+    parts.report(job)
+}
+
+/// What the parts of the check found, in model units.
+struct Parts {
+    topology: Topology,
+    continuity: Continuity,
+    distance: Distance,
+    worst: Option<(f64, Place)>,
+    weights: Weights,
+    /// Largest first-order distance of a vertex.
+    off_surface: f64,
+    not_finite: u64,
+}
+
+impl Parts {
+    /// The figures, relative where the report wants them so; no verdict yet.
+    fn report(self, job: &Job<'_>) -> CheckReport {
+        let Self { topology, continuity, distance, worst, weights, .. } = self;
+        let surface = job.surface;
+        let diagonal = surface.diagonal();
+        CheckReport {
+            faces: surface.faces().len() as u64,
+            vertices: surface.vertices().len() as u64,
+            euler_characteristic: topology.euler_characteristic(surface),
+            components: topology.components.len() as u32,
+            genus: topology.components.iter().map(|c| c.genus).sum(),
+            edge_defects: topology.defects,
+            component_list: topology.components,
+            diagonal,
+            gap_max: continuity.gap / diagonal,
+            shared_bits_differ: continuity.bits_differ,
+            g1_angle_deg_max: continuity.angle_deg_max,
+            g1_angle_deg_p99: continuity.angle_deg_p99,
+            rel_error_max: worst.map_or(f64::NAN, |(d, _)| d / diagonal),
+            rel_error_grid_max: distance.max / diagonal,
+            rel_error_rms: distance.rms / diagonal,
+            rel_error_mean: distance.mean / diagonal,
+            normal_error_deg_max: distance.normal_deg_max,
+            flipped_patches: distance.flipped,
+            degenerate_normals: distance.degenerate + continuity.degenerate_normals,
+            vertex_error_max: worse(self.off_surface, continuity.corner_gap) / diagonal,
+            lambda0_out_of_range: weights.out_of_range,
+            lambda0_min: weights.min,
+            lambda0_max: weights.max,
+            not_finite: self.not_finite,
+            repairs: job.repairs.clone(),
+            worst_error: worst.map(|(d, place)| Place { value: d / diagonal, ..place }),
+            worst_g1_angle: continuity.worst_angle,
+            worst_normal: distance.worst_normal,
+            pass: false,
+            failures: Vec::new(),
+        }
     }
 }
 

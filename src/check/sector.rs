@@ -16,8 +16,9 @@ pub(crate) struct Weights {
 
 /// Measures `lambda0` with `normals` (one a vertex, outward, any length).
 ///
-/// `lambda0 = [P,Q] / ([P,Q] - [R,Q])` [TK09, Eq. (16)] with `[a,b] = (a x b) . N`, where Q, P and
-/// R leave the vertex along the edge and along its counter-clockwise and clockwise neighbours. It
+/// `lambda0 = [P,Q] / ([P,Q] - [R,Q])`, row k = 0 of [TK, Table 2] crossed with Q, where
+/// `[a,b] = (a x b) . N` and Q, P and R leave the vertex along the edge and along its
+/// counter-clockwise and clockwise neighbours. It
 /// lies in (0, 1) exactly if both sectors turn by less than half a turn, that is if `[P,Q] < 0`
 /// and `[R,Q] > 0`; only that is asked, because two wrong signs give a quotient in range.
 pub(crate) fn measure(surface: &Surface, topology: &Topology, normals: &[Vec3]) -> Weights {

@@ -100,6 +100,7 @@ fn a_hundred_seeded_defects_are_all_found() {
     moved_points(&mut hunt);
     broken_numbers(&mut hunt);
     broken_connectivity(&mut hunt);
+    broken_unity(&mut hunt);
     broken_corners(&mut hunt);
     wrong_shape(&mut hunt);
     assert!(hunt.found >= 100, "only {} defects were seeded", hunt.found);
@@ -169,6 +170,9 @@ fn broken_connectivity(hunt: &mut Hunt) {
         d.faces.push(d.faces[f]);
         d.nets.push(d.nets[f]);
     });
+}
+
+fn broken_unity(hunt: &mut Hunt) {
     hunt.seed(3, "vertex without faces", "no face", |d, f| {
         d.vertices.push(d.vertices[f % 200]);
     });

@@ -32,7 +32,8 @@ make_exports() {
     local isospline="${CARGO_TARGET_DIR:-$root/target}/release/isospline"
     [ -x "$isospline" ] || { echo "foreign readers: build target/release/isospline first"; exit 1; }
     for model in sphere_80 torus_regular; do
-        "$isospline" run "$root/configs/$model.toml" --out "$1/$model" >/dev/null
+        "$isospline" run "$root/configs/$model.toml" --out "$1/$model" >"$1/$model.log" 2>&1 ||
+            { cat "$1/$model.log"; exit 1; }
         for format in npz vtu glb obj ply stl; do
             "$isospline" export "$1/$model" --format "$format" -o "$1/$model.$format" >/dev/null
         done
