@@ -41,7 +41,7 @@ pub(crate) fn evaluate<const K: usize, T>(
     if scratch.len() < n_lanes + CACHE_LINE {
         scratch.resize(n_lanes + CACHE_LINE, 0.0);
     }
-    // Vectors that straddle cache lines cost a quarter of the time.
+    // Every second vector would straddle cache lines otherwise.
     let start = scratch.as_ptr().align_offset(CACHE_LINE * size_of::<f64>()).min(CACHE_LINE);
     let file = &mut scratch[start..][..n_lanes];
     let mut at = 0;

@@ -281,6 +281,7 @@ fn power_up(a: f64, n: u32) -> f64 {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these bounds are exact")]
 mod tests {
     use super::*;
 

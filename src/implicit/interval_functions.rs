@@ -259,6 +259,7 @@ fn corners(op: BinaryOp, a: Interval, b: Interval) -> Interval {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these bounds are exact")]
 mod tests {
     use super::*;
 

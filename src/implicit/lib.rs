@@ -1,7 +1,9 @@
 //! Scalar fields: bulk value, gradient, Hessian and interval enclosure.
 //!
-//! A text becomes tokens, a graph without equal nodes, derivatives in the same graph, a tape on
-//! few registers, and is evaluated over blocks of points or over boxes.
+//! Text becomes tokens (`lexer`), a graph without equal nodes (`parser`, `dag`), derivatives
+//! in the same graph (`derivative`), elementary operations (`lowering`) and instructions on
+//! few registers (`tape`), which run over blocks of points (`evaluator`) or over boxes
+//! (`interval_evaluator`).
 
 pub mod bounds;
 mod canonical;

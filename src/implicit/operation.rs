@@ -125,7 +125,6 @@ pub(crate) fn sign(a: f64) -> f64 {
 }
 
 #[inline]
-#[expect(clippy::float_cmp, reason = "the guarded place is exactly zero")]
 pub(crate) fn unless_zero(a: f64, otherwise: f64) -> f64 {
     if a == 0.0 { 0.0 } else { otherwise }
 }
@@ -189,6 +188,7 @@ fn positive_power(a: f64, n: u32) -> f64 {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these results are exact")]
 mod tests {
     use super::*;
 

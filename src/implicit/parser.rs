@@ -351,9 +351,10 @@ impl<'a> Parser<'a> {
 fn nearest<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<String> {
     let allowed = (name.len() / 2).min(2);
     known
-        .map(|candidate| match candidate.eq_ignore_ascii_case(name) {
-            true => (0, candidate),
-            false => (strsim::damerau_levenshtein(name, candidate), candidate),
+        .map(|candidate| {
+            let same = candidate.eq_ignore_ascii_case(name);
+            let distance = if same { 0 } else { strsim::damerau_levenshtein(name, candidate) };
+            (distance, candidate)
         })
         .filter(|(distance, _)| *distance <= allowed)
         .min()

@@ -114,7 +114,9 @@ impl<'a> Plan<'a> {
 
     fn absorb_products(&mut self, roots: &[NodeId], needed: &[bool]) {
         let mut uses = vec![0_u32; needed.len()];
-        roots.iter().for_each(|root| uses[root.row()] += 2);
+        for root in roots {
+            uses[root.row()] += 2;
+        }
         let ids = || (0..needed.len()).filter(|&row| needed[row]).map(|row| NodeId(row as u32));
         for id in ids() {
             self.dag.node(id).children().for_each(|child| uses[child.row()] += 1);
@@ -242,7 +244,7 @@ struct Registers {
     last_use: Vec<usize>,
     register: Vec<u32>,
     free: Vec<u32>,
-    n_registers: u32,
+    count: u32,
     inputs: Vec<(u8, u32)>,
     roots: Vec<NodeId>,
 }
@@ -269,8 +271,8 @@ impl Registers {
                 inputs.push((axis, register[row]));
             }
         }
-        let n_registers = inputs.len() as u32;
-        Self { last_use, register, free: Vec::new(), n_registers, inputs, roots: roots.to_vec() }
+        let count = inputs.len() as u32;
+        Self { last_use, register, free: Vec::new(), count, inputs, roots: roots.to_vec() }
     }
 
     fn assign(mut self, steps: &[Step]) -> Tape {
@@ -280,15 +282,15 @@ impl Registers {
             instructions,
             outputs: self.roots.iter().map(|root| self.register[root.row()]).collect(),
             inputs: self.inputs,
-            n_registers: self.n_registers as usize,
+            n_registers: self.count as usize,
         }
     }
 
     /// The result never takes the place of an argument: see [`crate::evaluator`].
     fn place(&mut self, idx: usize, step: &Step) -> Instruction {
         let out = self.free.pop().unwrap_or_else(|| {
-            self.n_registers += 1;
-            self.n_registers - 1
+            self.count += 1;
+            self.count - 1
         });
         let mut args = [0; 4];
         let read = &step.args[..step.n_args];

@@ -1,5 +1,4 @@
 //! Nanoseconds a point of deccube: value, gradient, Hessian, enclosures; batches of 15 to 4096.
-#![expect(missing_docs, reason = "criterion's macros make undocumented functions")]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use isospline_geometry::Vec3;

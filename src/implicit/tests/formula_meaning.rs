@@ -1,5 +1,7 @@
 //! What formulas mean: precedence, lines, derivatives at kinks, canonical text.
 
+#![expect(clippy::float_cmp, reason = "these values are exact")]
+
 use isospline_geometry::Vec3;
 use isospline_implicit::{Field, Formula, Interval, Jet2, Oriented};
 use std::collections::BTreeMap;

@@ -81,7 +81,7 @@ fn formula(model: &Model) -> Formula {
     } else {
         model.formula.to_owned()
     };
-    Formula::parse(&text, &parameters).unwrap()
+    Formula::parse(&text, &parameters).expect("the models are formulas")
 }
 
 fn points(half: f64) -> Vec<Vec3> {

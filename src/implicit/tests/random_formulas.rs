@@ -94,7 +94,7 @@ fn any_expression() -> impl Strategy<Value = Expression> {
 }
 
 fn formula(expression: &Expression) -> Formula {
-    Formula::parse(&expression.text(), &BTreeMap::new()).unwrap()
+    Formula::parse(&expression.text(), &BTreeMap::new()).expect("generated formulas are formulas")
 }
 
 fn points() -> impl Strategy<Value = [f64; 3]> {
