@@ -1,6 +1,7 @@
 //! Whether the surface stays off the sides of the model's box.
 
 use crate::PolygonizeError;
+use crate::certificate::spread;
 use crate::complex::Complex;
 use crate::error::Side;
 use crate::grid::{Grid, Site};
@@ -130,11 +131,8 @@ fn excludes_zero(field: &dyn Field, domain: [Interval; 3]) -> bool {
     let Some(f) = field.value_enclosure(middle.map(|m| Interval::new(m, m))) else {
         return false;
     };
-    let reach = |k: usize| {
-        let slope = jet.gradient[k].lo.abs().max(jet.gradient[k].hi.abs());
-        slope * (domain[k].hi - middle[k]).max(middle[k] - domain[k].lo)
-    };
-    let spread = (reach(0) + reach(1) + reach(2)) * (1.0 + 1e-12);
+    let radius = [0, 1, 2].map(|k| (domain[k].hi - middle[k]).max(middle[k] - domain[k].lo));
+    let spread = spread(&jet.gradient, &radius.into()) * (1.0 + 1e-12);
     // Unbounded slopes make the spread infinite or NaN, and nothing is excluded.
     f.lo > spread || f.hi < -spread
 }

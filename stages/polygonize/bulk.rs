@@ -19,14 +19,11 @@ pub(crate) fn values(field: &dyn Field, points: &[Vec3]) -> Vec<f64> {
 }
 
 /// `make` of the shares of `items`, on the host's threads, in order.
-pub(crate) fn shares<I: Sync, T: Send + Sync>(
+pub(crate) fn shares<I: Sync, T: Clone + Send + Sync>(
     host: &dyn Host,
     items: &[I],
     make: impl Fn(&[I]) -> Vec<T> + Sync,
-) -> Vec<T>
-where
-    T: Clone,
-{
+) -> Vec<T> {
     let chunks: Vec<&[I]> = items.chunks(SHARE).collect();
     map(host, chunks.len(), |i| make(chunks[i])).concat()
 }

@@ -6,149 +6,166 @@
 //! 1. `f` and `L` have the same strict sign on the box, by enclosures, or
 //! 2. `grad L . grad f > 0` on the box, by the enclosure of `grad f`.
 //!
-//! Boxes that fail both are cut in eight, [`TEST_DEPTH`] times; what still fails is refined. The
-//! crate's page proves what follows when all pass.
+//! A box that fails both is halved along the axis that widens the enclosure most, within a budget;
+//! what still fails is refined. The crate's page proves what follows when all pass.
 
 use crate::complex::{Complex, Tetrahedron};
-use crate::grid::Site;
+use crate::interpolant::Interpolant;
 use isospline_geometry::Vec3;
-use isospline_implicit::{Interval, IntervalJet};
-use isospline_stage::Ctx;
+use isospline_implicit::{Field, Interval, IntervalJet, Jet1};
 
-/// How often a box is cut for the test alone. One more finds a few more proofs at four times
-/// the cost; one less refines the mesh where only the enclosures were wide.
-pub(crate) const TEST_DEPTH: u32 = 2;
-/// Margin for the rounding of the interpolant, relative to the terms that are summed.
-const ROUNDING: f64 = 1e-10;
+/// Boxes that one cube may take. Expanded polynomials of high degree (the double torus) need a few
+/// hundred where their gradient is small; more only delays refinement where it is due.
+const MOST_BOXES: u32 = 400;
+/// Halvings of a cube, over all axes, after which a box counts as failed.
+const MOST_HALVINGS: u32 = 15;
+/// Tetrahedra that turn from the gradient so far that their cosine is below this, at points of
+/// their own piece, are refined without asking for a proof: it would take many boxes.
+const HOPELESS_COSINE: f64 = 0.25;
 
-/// The linear interpolant on a tetrahedron.
-#[derive(Clone, Copy, Debug)]
-struct Interpolant {
-    corner: Vec3,
-    /// Gradients of the barycentrics of corners 1, 2, 3.
-    barycentric: [Vec3; 3],
-    value: f64,
-    gradient: Vec3,
-    least: f64,
-    most: f64,
-}
-
-/// The tetrahedra, of those given, that fail the test on the box `lo .. hi` that holds them all.
+/// The tetrahedra, of those given, that fail the test; all lie in the box `cube`.
 pub(crate) fn failing(
-    ctx: &Ctx<'_>,
+    field: &dyn Field,
     complex: &Complex,
     tetrahedra: &[Tetrahedron],
-    (lo, hi): (Site, Site),
+    cube: [Interval; 3],
 ) -> Vec<Tetrahedron> {
-    let interpolants: Vec<_> = tetrahedra.iter().map(|t| Interpolant::of(complex, t)).collect();
-    let test = Test { ctx, complex, interpolants: &interpolants };
-    let failed = test.failing_on(lo, hi, (1 << tetrahedra.len()) - 1, TEST_DEPTH);
-    (0..tetrahedra.len()).filter(|i| failed >> i & 1 == 1).map(|i| tetrahedra[i]).collect()
+    // One word holds the set of open tetrahedra; a cube has 24 of one kind at most.
+    tetrahedra.chunks(64).flat_map(|some| failing_of_few(field, complex, some, cube)).collect()
 }
 
-/// Box around a tetrahedron.
-pub(crate) fn box_around(complex: &Complex, t: &Tetrahedron) -> (Site, Site) {
-    let sites = t.map(|n| complex.site(n));
-    let over = |k: usize| sites.iter().map(move |s| s[k]);
-    let least = |k| over(k).min().expect("invariant: four nodes");
-    let most = |k| over(k).max().expect("invariant: four nodes");
-    ([0, 1, 2].map(least), [0, 1, 2].map(most))
+fn failing_of_few(
+    field: &dyn Field,
+    complex: &Complex,
+    tetrahedra: &[Tetrahedron],
+    cube: [Interval; 3],
+) -> Vec<Tetrahedron> {
+    let interpolants: Vec<_> = tetrahedra.iter().map(|t| Interpolant::of(complex, t)).collect();
+    let mut failed = hopeless(field, &interpolants);
+    let open = set(0..interpolants.len()) & !failed;
+    let mut test = Test { field, interpolants: &interpolants, boxes: MOST_BOXES, gains: [0.0; 3] };
+    failed |= test.failing_on(cube, open, [0; 3]);
+    members(failed).map(|i| tetrahedra[i]).collect()
+}
+
+/// Those whose own piece is seen to turn too far from the gradient.
+fn hopeless(field: &dyn Field, interpolants: &[Interpolant]) -> u64 {
+    let (mut points, mut owners) = (Vec::new(), Vec::new());
+    for (i, interpolant) in interpolants.iter().enumerate() {
+        points.extend(interpolant.crossings());
+        owners.resize(points.len(), i);
+    }
+    let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
+    field.gradients(&points, &mut jets);
+    set(owners.iter().zip(&jets).filter_map(|(&i, jet)| {
+        let (l, f) = (interpolants[i].gradient, jet.gradient);
+        (l.dot(&f) < HOPELESS_COSINE * l.norm() * f.norm()).then_some(i)
+    }))
+}
+
+fn set(members: impl IntoIterator<Item = usize>) -> u64 {
+    members.into_iter().fold(0, |set, i| set | 1 << i)
+}
+
+fn members(set: u64) -> impl Iterator<Item = usize> {
+    (0..64).filter(move |i| set >> i & 1 == 1)
+}
+
+/// The middle and half the size of a box; the half covers rounding of the middle.
+fn middle_and_radius(domain: &[Interval; 3]) -> (Vec3, Vec3) {
+    let middle = domain.map(|i| f64::midpoint(i.lo, i.hi));
+    let radius = [0, 1, 2].map(|k| (domain[k].hi - middle[k]).max(middle[k] - domain[k].lo));
+    (middle.into(), radius.into())
 }
 
 struct Test<'a> {
-    ctx: &'a Ctx<'a>,
-    complex: &'a Complex,
+    field: &'a dyn Field,
     interpolants: &'a [Interpolant],
+    /// Boxes left.
+    boxes: u32,
+    /// What halving the whole cube along each axis takes from the width of the enclosure.
+    gains: [f64; 3],
 }
 
 impl Test<'_> {
-    /// The members of the bit set `open` that fail on the box.
-    fn failing_on(&self, lo: Site, hi: Site, open: u32, depth: u32) -> u32 {
-        let grid = &self.complex.grid;
-        let Some(jet) = self.ctx.field.gradient_enclosure(grid.intervals(lo, hi)) else {
-            return open;
+    /// The members of the set `open` that fail on a box made by so many halvings along each axis.
+    fn failing_on(&mut self, domain: [Interval; 3], open: u64, halvings: [u32; 3]) -> u64 {
+        let (middle, radius) = middle_and_radius(&domain);
+        let pick = |open: u64, keep: &dyn Fn(&Interpolant) -> bool| {
+            set(members(open).filter(|&i| keep(&self.interpolants[i])))
         };
-        let middle = 0.5 * (grid.point(lo) + grid.point(hi));
-        let radius = 0.5 * (grid.point(hi) - grid.point(lo));
-        let members = (0..self.interpolants.len()).filter(|i| open >> i & 1 == 1);
-        let open = members
-            .filter(|&i| !self.interpolants[i].passes(&jet, middle, radius))
-            .fold(0, |set, i| set | 1 << i);
-        if open == 0 || depth == 0 {
+        let open = pick(open, &|i| !i.is_beside(middle, radius));
+        if open == 0 || self.boxes == 0 {
             return open;
         }
-        let mut failed = 0;
-        for (lo, hi) in octants(lo, hi) {
-            // One failing box settles a tetrahedron: no need to look at its other boxes.
-            let left = open & !failed;
-            if left == 0 {
-                break;
-            }
-            failed |= self.failing_on(lo, hi, left, depth - 1);
+        self.boxes -= 1;
+        let Some(jet) = self.field.gradient_enclosure(domain) else { return open };
+        let open = pick(open, &|i| {
+            !i.is_transversal(&jet.gradient) && !i.has_sign_of(jet.value, middle, radius)
+        });
+        if open == 0 {
+            return 0;
         }
-        failed
+        let mut open = open;
+        // Near the surface the interpolants change sign themselves: no form of f would help.
+        if members(open).any(|i| self.interpolants[i].has_sign(middle, radius)) {
+            let value = self.mean_value_form(&jet, middle, radius);
+            open = pick(open, &|i| !i.has_sign_of(value, middle, radius));
+        }
+        if open == 0 || halvings.iter().sum::<u32>() >= MOST_HALVINGS {
+            return open;
+        }
+        if halvings == [0; 3] {
+            self.gains = self.gains_of(&domain, &jet, open);
+        }
+        self.failing_on_halves(domain, open, halvings)
+    }
+
+    fn failing_on_halves(&mut self, domain: [Interval; 3], open: u64, halvings: [u32; 3]) -> u64 {
+        let gain = |k: usize| self.gains[k] / (1_u64 << halvings[k]) as f64;
+        let axis = (0..3).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
+        let axis = axis.expect("invariant: three axes");
+        let mut deeper = halvings;
+        deeper[axis] += 1;
+        let middle = f64::midpoint(domain[axis].lo, domain[axis].hi);
+        let (mut lower, mut upper) = (domain, domain);
+        lower[axis].hi = middle;
+        upper[axis].lo = middle;
+        let failed = self.failing_on(lower, open, deeper);
+        // One failing box settles a tetrahedron: no need to look at its other boxes.
+        if open == failed { open } else { failed | self.failing_on(upper, open & !failed, deeper) }
+    }
+
+    /// `f(m) + grad f . (x - m)`: its excess shrinks with the square of the box.
+    fn mean_value_form(&self, jet: &IntervalJet, middle: Vec3, radius: Vec3) -> Interval {
+        let at_middle = [0, 1, 2].map(|k| Interval::new(middle[k], middle[k]));
+        let Some(f) = self.field.value_enclosure(at_middle) else { return jet.value };
+        let spread = spread(&jet.gradient, &radius) * (1.0 + 1e-12);
+        let form = Interval::new((f.lo - spread).next_down(), (f.hi + spread).next_up());
+        if form.lo.is_finite() && form.hi.is_finite() { form } else { jet.value }
+    }
+
+    /// How much narrower `grad L . grad f` gets where an axis shrinks to its middle.
+    fn gains_of(&self, domain: &[Interval; 3], jet: &IntervalJet, open: u64) -> [f64; 3] {
+        let weights = members(open).map(|i| self.interpolants[i].gradient.abs());
+        let weights: Vec3 = weights.sum();
+        let width = |jet: &IntervalJet| {
+            (0..3).map(|k| weights[k] * (jet.gradient[k].hi - jet.gradient[k].lo)).sum::<f64>()
+        };
+        let whole = width(jet);
+        [0, 1, 2].map(|axis| {
+            let mut thin = *domain;
+            let middle = f64::midpoint(thin[axis].lo, thin[axis].hi);
+            thin[axis] = Interval::new(middle, middle);
+            let gain = self.field.gradient_enclosure(thin).map_or(0.0, |jet| whole - width(&jet));
+            // Where slopes are unbounded all axes count alike; a thousandth keeps every axis in
+            // play, since the sign of f needs them too.
+            if gain.is_finite() { gain.max(1e-3 * whole) } else { 1.0 }
+        })
     }
 }
 
-/// The eight parts of a box, fewer where a side is a single lattice step.
-fn octants(lo: Site, hi: Site) -> impl Iterator<Item = (Site, Site)> {
-    let middle = [0, 1, 2].map(|k| u32::midpoint(lo[k], hi[k]));
-    (0..8u32).filter_map(move |i| {
-        let upper = [i & 1 == 1, i >> 1 & 1 == 1, i >> 2 == 1];
-        let from = [0, 1, 2].map(|k| if upper[k] { middle[k] } else { lo[k] });
-        let to = [0, 1, 2].map(|k| if upper[k] { hi[k] } else { middle[k] });
-        // A side of one step has its middle at the lower end: only the upper part is a box.
-        (0..3).all(|k| from[k] < to[k]).then_some((from, to))
-    })
-}
-
-impl Interpolant {
-    fn of(complex: &Complex, t: &Tetrahedron) -> Self {
-        let [p0, p1, p2, p3] = t.map(|n| complex.point(n));
-        let f = t.map(|n| complex.value(n));
-        let (a, b, c) = (p1 - p0, p2 - p0, p3 - p0);
-        let volume = a.cross(&b).dot(&c);
-        let barycentric = [b.cross(&c), c.cross(&a), a.cross(&b)].map(|n| n / volume);
-        let gradient = (0..3).map(|k| (f[k + 1] - f[0]) * barycentric[k]).sum();
-        let [least, most] = [f64::min, f64::max].map(|pick| f.into_iter().reduce(pick));
-        let (least, most) = least.zip(most).expect("invariant: four nodes");
-        Self { corner: p0, barycentric, value: f[0], gradient, least, most }
-    }
-
-    fn passes(&self, jet: &IntervalJet, middle: Vec3, radius: Vec3) -> bool {
-        self.is_transversal(&jet.gradient)
-            || self.has_sign_of(jet.value, middle, radius)
-            || self.is_beside(middle, radius)
-    }
-
-    /// `grad L . g > 0` for all `g` of the enclosure.
-    fn is_transversal(&self, enclosure: &[Interval; 3]) -> bool {
-        let (mut least, mut size) = (0.0, 0.0);
-        for (g, slope) in self.gradient.iter().zip(enclosure) {
-            least += (g * slope.lo).min(g * slope.hi);
-            size += g.abs() * slope.lo.abs().max(slope.hi.abs());
-        }
-        // Unbounded or unknown slopes make the size infinite or NaN: no proof.
-        least > ROUNDING * size && enclosure.iter().all(|i| i.lo.is_finite() && i.hi.is_finite())
-    }
-
-    /// `f` and `L` are both positive or both negative on what the box shares with T.
-    fn has_sign_of(&self, value: Interval, middle: Vec3, radius: Vec3) -> bool {
-        let center = self.value + self.gradient.dot(&(middle - self.corner));
-        let rounding = ROUNDING * self.least.abs().max(self.most.abs());
-        let spread = self.gradient.abs().dot(&radius) + rounding;
-        // On T the interpolant also stays between the node values.
-        (value.lo > 0.0 && (center - spread).max(self.least) > 0.0)
-            || (value.hi < 0.0 && (center + spread).min(self.most) < 0.0)
-    }
-
-    /// The box does not meet the tetrahedron: a barycentric is negative on all of it.
-    fn is_beside(&self, middle: Vec3, radius: Vec3) -> bool {
-        let offset = middle - self.corner;
-        let negative = |constant: f64, slope: Vec3| {
-            constant + slope.dot(&offset) + slope.abs().dot(&radius) < -ROUNDING
-        };
-        let [b1, b2, b3] = self.barycentric;
-        negative(1.0, -(b1 + b2 + b3)) || self.barycentric.iter().any(|&b| negative(0.0, b))
-    }
+/// Largest value of `g . d` over `g` in an enclosure and `|d| <= radius` by components.
+pub(crate) fn spread(enclosure: &[Interval; 3], radius: &Vec3) -> f64 {
+    (0..3).map(|k| enclosure[k].lo.abs().max(enclosure[k].hi.abs()) * radius[k]).sum()
 }

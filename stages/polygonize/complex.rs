@@ -11,6 +11,7 @@ use crate::bulk;
 use crate::grid::{Grid, Site, pack, unpack};
 use crate::key_map::{KeyMap, pair};
 use isospline_geometry::Vec3;
+use isospline_implicit::Interval;
 use isospline_stage::Ctx;
 
 /// Four nodes, positively oriented.
@@ -92,10 +93,10 @@ impl Complex {
         kuhn.iter().map(|t| t.map(|i| corners[i as usize])).chain(refined.iter().map(|t| t.nodes))
     }
 
-    /// Lattice corners of a cell's box.
-    pub(crate) fn cell_box(&self, cell: usize) -> (Site, Site) {
+    /// The box of a cell.
+    pub(crate) fn cell_box(&self, cell: usize) -> [Interval; 3] {
         let corners = &self.cells[cell].corners;
-        (self.site(corners[0]), self.site(corners[7]))
+        self.grid.intervals(self.site(corners[0]), self.site(corners[7]))
     }
 
     /// Whether all corners of an unrefined cell lie on one side: it has no piece of the mesh.
@@ -232,7 +233,7 @@ impl Complex {
     fn queue_cells_at(&mut self, at: Site) {
         let scale = self.grid.scale();
         // On a cell border the lower neighbour has the point too.
-        let lower = at.map(|c| if c % scale == 0 && c > 0 { 1 } else { 0 });
+        let lower = at.map(|c| u32::from(c % scale == 0 && c > 0));
         for i in 0..8u32 {
             let back = [i & 1, i >> 1 & 1, i >> 2];
             if (0..3).any(|k| back[k] > lower[k]) {

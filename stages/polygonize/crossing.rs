@@ -43,7 +43,7 @@ pub(crate) fn linear_positions(complex: &Complex, crossings: &[[u32; 2]]) -> Vec
 fn narrow(ctx: &Ctx<'_>, brackets: &mut [Bracket]) {
     let mut open: Vec<u32> = (0..brackets.len() as u32).collect();
     let (mut points, mut places) = (Vec::new(), Vec::new());
-    for step in 0..MOST_STEPS + 1 {
+    for step in 0..=MOST_STEPS {
         open.retain(|&i| brackets[i as usize].is_open());
         if open.is_empty() {
             return;

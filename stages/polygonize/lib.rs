@@ -50,6 +50,7 @@ mod complex;
 mod crossing;
 pub mod error;
 mod grid;
+mod interpolant;
 mod key_map;
 mod marching;
 mod observation;
@@ -126,8 +127,11 @@ fn polygonize(
     let grid = resolution::choose(ctx, params)?;
     ctx.host.progress(0, 1)?;
     let cells = surface_cells::surface_cells(ctx, &grid, params.max_cells)?;
-    let sides_are_clear = box_sides::are_clear(ctx, &grid, &cells)?;
     let mut complex = Complex::new(ctx, grid.clone(), &cells)?;
+    let sides_are_clear = box_sides::are_clear(ctx, &grid, &cells).or_else(|leaves_box| {
+        // A larger box would not mend a singular surface: that is the better message.
+        proof::no_singular_point(ctx, &complex).and(Err(leaves_box))
+    })?;
     counters.count("cells", complex.n_cells() as u64);
     counters.max("cells_a_side", f64::from(grid.longest()));
     let proof = if sides_are_clear && proof::prove(ctx, &mut complex, params, counters)? {

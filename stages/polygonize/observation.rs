@@ -88,7 +88,9 @@ fn components(ctx: &Ctx<'_>, complex: &Complex) -> Result<Vec<Component>, Polygo
             }
         }
     }
-    all.iter_mut().for_each(|c| c.euler_characteristic /= 2);
+    for component in &mut all {
+        component.euler_characteristic /= 2;
+    }
     let key = |c: &Component| c.euler_characteristic;
     all.sort_by(|a, b| key(a).cmp(&key(b)).then(a.volume.total_cmp(&b.volume)));
     Ok(all)
@@ -98,7 +100,7 @@ fn largest(components: &[u32]) -> usize {
     components.iter().max().map_or(0, |&c| c as usize)
 }
 
-/// Signed volume between a face and the middle of nothing in particular: sums to the volume.
+/// Signed volume of the tetrahedron over a face; all share their apex, so they sum to the volume.
 fn volume_under(mesh: &TriangleMesh, face: u32) -> f64 {
     let origin = mesh.positions[0];
     let [a, b, c] = mesh.corners(face).map(|p| p - origin);

@@ -1,23 +1,22 @@
 //! Refining until the topology is proved, or until it is clear that it will not be.
 
-use crate::certificate::{box_around, failing};
+use crate::certificate::failing;
 use crate::complex::{Complex, Tetrahedron};
+use crate::grid::Site;
 use crate::params::PolygonizeParams;
 use crate::{PolygonizeError, singular};
 use isospline_geometry::{Aabb, Vec3};
 use isospline_stage::{Counters, Ctx, map};
 
-/// Cells a task of the first round.
+/// Cells or cubes a task.
 const CELLS_A_TASK: usize = 64;
-/// Tetrahedra a task of the later rounds.
-const TETRAHEDRA_A_TASK: usize = 64;
 /// Failing tetrahedra from which a singular point is searched, spread over all that fail.
 const SEARCHES: usize = 16;
 /// Tetrahedra tested in refinement rounds, for each that the grid had and at least
 /// [`LEAST_BUDGET`], before the proof is given up: along a kink their number doubles with every
 /// halving and nothing is gained.
-const BUDGET: usize = 4;
-const LEAST_BUDGET: usize = 50_000;
+const BUDGET: usize = 1;
+const LEAST_BUDGET: usize = 10_000;
 
 /// Refines `complex` until all its tetrahedra pass the test; false if they will not.
 ///
@@ -50,11 +49,19 @@ pub(crate) fn prove(
     Ok(true)
 }
 
+/// Searches singular points where the unrefined complex fails the test.
+///
+/// # Errors
+/// [`PolygonizeError::SingularPoint`] if there is one.
+pub(crate) fn no_singular_point(ctx: &Ctx<'_>, complex: &Complex) -> Result<(), PolygonizeError> {
+    search_singular_points(ctx, complex, &failing_cells(ctx, complex))
+}
+
 fn failing_cells(ctx: &Ctx<'_>, complex: &Complex) -> Vec<Tetrahedron> {
     let n_tasks = complex.n_cells().div_ceil(CELLS_A_TASK);
     let of_cell = |cell: usize| {
         let tetrahedra: Vec<_> = complex.tetrahedra(cell).collect();
-        failing(ctx, complex, &tetrahedra, complex.cell_box(cell))
+        failing(ctx.field, complex, &tetrahedra, complex.cell_box(cell))
     };
     map(ctx.host, n_tasks, |task| {
         let last = ((task + 1) * CELLS_A_TASK).min(complex.n_cells());
@@ -63,14 +70,31 @@ fn failing_cells(ctx: &Ctx<'_>, complex: &Complex) -> Vec<Tetrahedron> {
     .concat()
 }
 
+/// Tests tetrahedra cube by cube, so that those of one cube share its enclosures.
 fn failing_tetrahedra(
     ctx: &Ctx<'_>,
     complex: &Complex,
     tetrahedra: &[Tetrahedron],
 ) -> Vec<Tetrahedron> {
-    let shares: Vec<_> = tetrahedra.chunks(TETRAHEDRA_A_TASK).collect();
-    let of_one = |t: &Tetrahedron| failing(ctx, complex, &[*t], box_around(complex, t));
-    map(ctx.host, shares.len(), |i| shares[i].iter().flat_map(of_one).collect::<Vec<_>>()).concat()
+    let mut homes: Vec<_> = tetrahedra.iter().map(|t| (home(complex, t), *t)).collect();
+    // Stable: within a cube the order stays.
+    homes.sort_by_key(|&(cube, _)| cube);
+    let cubes: Vec<_> = homes.chunk_by(|a, b| a.0 == b.0).collect();
+    let shares: Vec<_> = cubes.chunks(CELLS_A_TASK).collect();
+    let of_cube = |members: &&[((Site, u32), Tetrahedron)]| {
+        let (lo, width) = members[0].0;
+        let tetrahedra: Vec<_> = members.iter().map(|m| m.1).collect();
+        failing(ctx.field, complex, &tetrahedra, complex.grid.intervals(lo, lo.map(|c| c + width)))
+    };
+    map(ctx.host, shares.len(), |i| shares[i].iter().flat_map(of_cube).collect::<Vec<_>>()).concat()
+}
+
+/// The cube of the bisection tree that a tetrahedron lies in: its lower corner and width.
+fn home(complex: &Complex, t: &Tetrahedron) -> (Site, u32) {
+    let width = width(complex, t);
+    let sites = t.map(|n| complex.site(n));
+    let least = |k: usize| sites.iter().map(|s| s[k]).min().expect("invariant: four nodes");
+    ([0, 1, 2].map(|k| least(k) / width * width), width)
 }
 
 fn width(complex: &Complex, t: &Tetrahedron) -> u32 {
@@ -84,7 +108,7 @@ fn search_singular_points(
     failed: &[Tetrahedron],
 ) -> Result<(), PolygonizeError> {
     let scale = complex.typical_value();
-    for t in failed.iter().step_by(failed.len().div_ceil(SEARCHES)) {
+    for t in failed.iter().step_by(failed.len().div_ceil(SEARCHES).max(1)) {
         let points = t.map(|n| complex.point(n));
         let middle: Vec3 = 0.25 * points.iter().sum::<Vec3>();
         let around = Aabb::around(&points);

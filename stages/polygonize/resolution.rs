@@ -5,7 +5,7 @@ use crate::grid::{Grid, Site};
 use crate::marching::Pieces;
 use crate::params::PolygonizeParams;
 use crate::surface_cells::{MOST_DENSE_CELLS, has_intervals, surface_cells};
-use crate::{PolygonizeError, bulk, certificate};
+use crate::{PolygonizeError, bulk};
 use isospline_geometry::{Aabb, Vec3};
 use isospline_stage::Ctx;
 
@@ -13,11 +13,13 @@ use isospline_stage::Ctx;
 const FIRST_CELLS: u32 = 16;
 /// Cells a side at which looking for a first triangle ends.
 const LAST_CELLS: u32 = 128;
+/// Cells in which a first triangle is looked for: a regular surface has far more triangles there.
+const MOST_SEARCHED: u32 = 20_000;
 /// Triangles of a pass that foretell the count of a finer one to some 10 %.
 const ENOUGH_TRIANGLES: usize = 400;
-/// Triangles that remain of a hundred after short edges are merged (measured: 42 to 46 on the
+/// Triangles that remain of a hundred after short edges are merged (measured: 32 to 38 on the
 /// models of [TK, Fig. 9-15]).
-const REMAINING: f64 = 0.44;
+const REMAINING: f64 = 0.34;
 /// The box is cropped to the surface where that takes away this share of its longest side:
 /// otherwise a sphere in a box a million times its size would need as many cells.
 const CROP: f64 = 0.25;
@@ -28,7 +30,7 @@ const CROP: f64 = 0.25;
 /// [`PolygonizeError::EmptyBox`], [`PolygonizeError::EmptyLevelSet`],
 /// [`PolygonizeError::TooManyCells`] and [`PolygonizeError::NotANumber`].
 pub(crate) fn choose(ctx: &Ctx<'_>, params: &PolygonizeParams) -> Result<Grid, PolygonizeError> {
-    let levels = params.max_depth + certificate::TEST_DEPTH;
+    let levels = params.max_depth;
     // Also false for NaN.
     let has_volume = |size: Vec3| size.iter().all(|&s| s > 0.0 && s.is_finite());
     if !has_volume(ctx.domain.size()) {
@@ -42,8 +44,10 @@ pub(crate) fn choose(ctx: &Ctx<'_>, params: &PolygonizeParams) -> Result<Grid, P
     let mut n_triangles = count_triangles(ctx, params, &grid)?;
     while n_triangles < ENOUGH_TRIANGLES && grid.longest() < LAST_CELLS {
         let finer = Grid::new(domain, 2 * grid.longest(), levels);
+        let few =
+            PolygonizeParams { max_cells: MOST_SEARCHED.min(params.max_cells), ..params.clone() };
         // A box full of possible surface is no reason to stop: the test will tell more.
-        match count_triangles(ctx, params, &finer) {
+        match count_triangles(ctx, &few, &finer) {
             Err(PolygonizeError::TooManyCells { .. }) => break,
             found => n_triangles = found?,
         }

@@ -8,32 +8,42 @@ use isospline_implicit::{Field, Jet1};
 /// ever more often.
 const SHORT: f64 = 0.5;
 /// Least cosine between a merged face and the surface normals at its corners.
-const LEAST_COSINE: f64 = 0.5;
+const LEAST_COSINE: f64 = 0.3;
 /// Least shape of a merged face, 1 for an equilateral triangle, unless it replaces a worse one.
-const LEAST_SHAPE: f64 = 0.2;
+const LEAST_SHAPE: f64 = 0.1;
 
 /// Merges edges shorter than half a cell side (`sides[v]` at vertex v) wherever that keeps the
 /// topology (link condition) and turns no face; vertices stay where they are or go.
 pub(crate) fn merge(mesh: TriangleMesh, sides: &[f64], field: &dyn Field) -> TriangleMesh {
     let normals = normals(field, &mesh.positions);
     let mut edit = EditMesh::new(mesh).expect("invariant: marching tetrahedra make a manifold");
-    for (_, h) in short_edges(&edit, sides) {
+    // A merge may free another that was refused before, say about a vertex with three faces.
+    while merge_once(&mut edit, &normals, sides) > 0 {}
+    edit.compact()
+}
+
+/// Tries all short edges, the shortest first; the number merged.
+fn merge_once(edit: &mut EditMesh, normals: &[Vec3], sides: &[f64]) -> usize {
+    let mut merged = 0;
+    for (_, h) in short_edges(edit, sides) {
         // Earlier merges rename and remove: look again at what is there now.
         if !edit.is_face(h.face()) {
             continue;
         }
         let (a, b) = (edit.origin(h), edit.target(h));
-        if !is_short(&edit, sides, a, b) || !edit.can_collapse(h) {
+        if !is_short(edit, sides, a, b) || !edit.can_collapse(h) {
             continue;
         }
         let o = edit.opposite(h).expect("invariant: the mesh is closed");
-        if may_move(&edit, &normals, b, a) {
+        if may_move(edit, normals, b, a) {
             edit.collapse(h);
-        } else if may_move(&edit, &normals, a, b) {
+            merged += 1;
+        } else if may_move(edit, normals, a, b) {
             edit.collapse(o);
+            merged += 1;
         }
     }
-    edit.compact()
+    merged
 }
 
 fn normals(field: &dyn Field, points: &[Vec3]) -> Vec<Vec3> {
@@ -71,10 +81,10 @@ fn may_move(edit: &EditMesh, normals: &[Vec3], from: u32, to: u32) -> bool {
             return true;
         }
         let at = |v: u32| edit.positions[v as usize];
-        let new = [at(to), at(b), at(c)];
-        let worst = shape(&[at(from), at(b), at(c)]).min(LEAST_SHAPE);
-        let faces_out = [to, b, c].iter().all(|&v| is_facing(&new, &normals[v as usize]));
-        faces_out && shape(&new) >= worst
+        let (old, new) = ([at(from), at(b), at(c)], [at(to), at(b), at(c)]);
+        let corner_normals = [to, b, c].map(|v| normals[v as usize]);
+        shape(&new) >= shape(&old).min(LEAST_SHAPE)
+            && cosine(&new, &corner_normals) >= cosine(&old, &corner_normals).min(LEAST_COSINE)
     })
 }
 
@@ -82,10 +92,12 @@ fn normal([a, b, c]: &[Vec3; 3]) -> Vec3 {
     (b - a).cross(&(c - a))
 }
 
-/// A missing surface normal (kinks, NaN) faces nothing, so nothing is merged there.
-fn is_facing(corners: &[Vec3; 3], direction: &Vec3) -> bool {
+/// Least cosine of the angles between a face and the given directions; -1 where that is not
+/// known (kinks, flat faces).
+fn cosine(corners: &[Vec3; 3], directions: &[Vec3; 3]) -> f64 {
     let n = normal(corners);
-    n.dot(direction) >= LEAST_COSINE * n.norm()
+    let least = directions.iter().map(|d| n.dot(d) / n.norm()).fold(1.0, f64::min);
+    if least.is_nan() { -1.0 } else { least }
 }
 
 /// `4 sqrt(3) area / sum of squared sides`: 1 if equilateral, 0 if flat.

@@ -98,8 +98,10 @@ impl Block {
             if self.hi[k] - self.lo[k] > 1 {
                 let middle = u32::midpoint(self.lo[k], self.hi[k]);
                 let mut upper = blocks.clone();
-                blocks.iter_mut().for_each(|b| b.hi[k] = middle);
-                upper.iter_mut().for_each(|b| b.lo[k] = middle);
+                for (lower, upper) in blocks.iter_mut().zip(&mut upper) {
+                    lower.hi[k] = middle;
+                    upper.lo[k] = middle;
+                }
                 blocks.extend(upper);
             }
         }

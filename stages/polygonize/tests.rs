@@ -4,7 +4,8 @@ use crate::{Polygonize, PolygonizeError, PolygonizeParams};
 use isospline_artifact::kinds::{Mesh, TopologyProof};
 use isospline_geometry::{Aabb, Vec3};
 use isospline_implicit::{ClosureField, Field, Formula};
-use isospline_stage::{Ctx, Diagnosis, Piece, Serial, Stage, Task};
+use isospline_stage::contract::Fixture;
+use isospline_stage::{Ctx, Diagnosis, Host, Piece, Serial, Stage, Stopped, Task};
 use std::collections::BTreeMap;
 
 const TORUS: &str = "(sqrt(x^2+y^2)-5)^2+z^2-1";
@@ -41,7 +42,6 @@ fn with_faces(faces: u32) -> PolygonizeParams {
 fn check(text: &str, domain: Aabb, faces: u32, components: u32, euler: i64) {
     let field = formula(text);
     let Piece { rows, counters } = run(&field, domain, &with_faces(faces)).unwrap();
-    println!("{text:.30}: {:?} {} triangles {counters:?}", rows.topology[0], rows.face.len());
     let found = rows.topology[0];
     assert_eq!(found.proof, TopologyProof::Certified.code(), "{counters:?}");
     assert_eq!((found.components, found.euler_characteristic), (components, euler));
@@ -96,4 +96,154 @@ fn deccube_is_certified_with_genus_thirteen() {
 fn two_disjoint_spheres_are_two_certified_components() {
     let text = "min((x-1)^2+y^2+z^2-0.25, (x+1)^2+y^2+z^2-0.09)";
     check(text, cube(2.0), 1000, 2, 4);
+}
+
+/// The error of a field in a box with half sides of 1.3.
+fn error_of(text: &str) -> PolygonizeError {
+    run(&formula(text), cube(1.3), &with_faces(500)).unwrap_err()
+}
+
+#[test]
+fn an_empty_level_set_tells_the_range_of_f() {
+    let error = error_of("x^2+y^2+z^2+1");
+    let PolygonizeError::EmptyLevelSet { min, max } = error else { panic!("{error:?}") };
+    assert_eq!((min, error.code()), (1.0, "empty-level-set"));
+    assert!((max - (1.0 + 3.0 * 1.69)).abs() < 1e-12);
+}
+
+#[test]
+fn a_surface_that_leaves_or_touches_the_box_names_the_side() {
+    for (text, name) in [("(x+0.5)^2+y^2+z^2-1", "x-"), ("x^2+y^2+(z-0.3)^2-1", "z+")] {
+        let error = error_of(text);
+        let PolygonizeError::LeavesBox { side, at } = error else { panic!("{error:?}") };
+        assert_eq!(side.to_string(), name);
+        assert!((at[side.axis].abs() - 1.3).abs() < 1e-12, "{at}");
+    }
+}
+
+#[test]
+fn a_field_without_intervals_that_leaves_the_box_names_the_side() {
+    let field = ClosureField::new(1.0, |p: Vec3| p.y * p.y + p.z * p.z - 0.5);
+    let error = run(&field, cube(1.3), &with_faces(500)).unwrap_err();
+    let PolygonizeError::LeavesBox { side, .. } = error else { panic!("{error:?}") };
+    assert_eq!(side.axis, 0);
+}
+
+#[test]
+fn not_a_number_is_reported_with_its_point() {
+    for text in ["x^2+y^2+z^2-1+1e-9*sqrt(x+0.5)", "sqrt(-1-x^2)+y"] {
+        let error = error_of(text);
+        let PolygonizeError::NotANumber { at } = error else { panic!("{text}: {error:?}") };
+        assert!(formula(text).value(at).is_nan(), "{at}");
+    }
+    let holed = ClosureField::new(1.0, |p: Vec3| if p.x > 1.0 { f64::NAN } else { p.norm() - 0.9 });
+    let error = run(&holed, cube(1.3), &with_faces(500)).unwrap_err();
+    assert!(error.place().is_some_and(|at| at.x > 1.0), "{error}");
+}
+
+#[test]
+fn singular_points_are_found_with_their_place() {
+    for (text, distance) in [
+        ("x^2+y^2-z^2", (|p| p.norm()) as fn(Vec3) -> f64),
+        ("(x^2+y^2+z^2)^2-(x^2-y^2-z^2)", |p| p.norm()),
+        ("(x^2+y^2+z^2-1)^2", |p| (p.norm() - 1.0).abs()),
+        ("0*x", |_| 0.0),
+    ] {
+        let error = error_of(text);
+        let PolygonizeError::SingularPoint { at, .. } = error else { panic!("{text}: {error:?}") };
+        assert!(distance(at) < 1e-4, "{text}: {at}");
+        assert!(error.place().is_some() && error.help().is_some());
+    }
+}
+
+#[test]
+fn a_box_with_kinks_is_observed_and_not_certified() {
+    let text = "sqrt(max(abs(x)-1,0)^2+max(abs(y)-0.7,0)^2+max(abs(z)-0.5,0)^2)\
+                +min(max(abs(x)-1,max(abs(y)-0.7,abs(z)-0.5)),0)";
+    let topology = run(&formula(text), cube(1.3), &with_faces(1000)).unwrap().rows.topology[0];
+    assert_eq!(topology.proof, TopologyProof::Observed.code());
+    assert_eq!((topology.components, topology.euler_characteristic), (1, 2));
+}
+
+#[test]
+fn a_closure_without_intervals_is_observed() {
+    let field = ClosureField::new(1.0, |p: Vec3| {
+        let ring = (p.x * p.x + p.y * p.y).sqrt() - 0.8;
+        ring * ring + p.z * p.z - 0.09
+    });
+    let topology = run(&field, cube(1.3), &with_faces(1000)).unwrap().rows.topology[0];
+    assert_eq!(topology.proof, TopologyProof::Observed.code());
+    assert_eq!((topology.components, topology.euler_characteristic), (1, 0));
+}
+
+#[test]
+fn a_shell_that_two_grids_see_differently_is_unresolved() {
+    // Checkers that change with every grid: no two resolutions agree.
+    let field = ClosureField::new(1.0, |p: Vec3| {
+        let wave = |x: f64| (400.0 * x * x).sin();
+        if p.norm() > 1.2 { 1.0 } else { wave(p.x) * wave(p.y) * wave(p.z) + 0.1 }
+    });
+    let error = run(&field, cube(1.3), &with_faces(1000)).unwrap_err();
+    assert_eq!(error.code(), "topology-unresolved", "{error}");
+}
+
+#[test]
+fn a_sphere_smaller_than_a_cell_of_the_first_grids_is_found_and_certified() {
+    let text = "min((x-0.3)^2+(y-0.2)^2+(z-0.1)^2-1e-4, x^2+y^2+(z+0.5)^2-0.25)";
+    let topology = run(&formula(text), cube(1.3), &with_faces(500)).unwrap().rows.topology[0];
+    assert_eq!(topology.proof, TopologyProof::Certified.code());
+    assert_eq!((topology.components, topology.euler_characteristic), (2, 4));
+}
+
+#[test]
+fn a_unit_sphere_is_found_in_a_box_a_thousand_million_times_larger() {
+    check("x^2+y^2+z^2-1", cube(1e9), 500, 1, 2);
+}
+
+#[test]
+fn a_box_without_volume_and_a_grid_too_fine_are_errors() {
+    let field = formula("x^2+y^2+z^2-1");
+    let flat = Aabb::new(Vec3::zeros(), Vec3::new(1.0, 0.0, 1.0));
+    assert_eq!(run(&field, flat, &with_faces(500)), Err(PolygonizeError::EmptyBox));
+    let nan = Aabb::new(Vec3::zeros(), Vec3::new(1.0, f64::NAN, 1.0));
+    assert_eq!(run(&field, nan, &with_faces(500)), Err(PolygonizeError::EmptyBox));
+    let params = PolygonizeParams { faces: 100_000_000, max_cells: 10_000, ..with_faces(4) };
+    let error = run(&field, cube(1.3), &params).unwrap_err();
+    assert_eq!(error.code(), "too-many-cells");
+}
+
+#[test]
+fn the_number_of_cells_can_be_set() {
+    let params = PolygonizeParams { cells: 40, ..with_faces(500) };
+    let piece = run(&formula("x^2+y^2+z^2-1"), cube(1.3), &params).unwrap();
+    assert!((piece.counters.maxima["cells_a_side"] - 40.0).abs() < 0.5);
+    assert!(piece.rows.face.len() > 4000, "{}", piece.rows.face.len());
+}
+
+fn small_chair() -> Fixture<Polygonize> {
+    Fixture::new(formula(CHAIR), cube(5.5)).with_params(with_faces(1000))
+}
+
+isospline_stage::stage_contract!(Polygonize, small_chair);
+
+/// Asks to stop at the first report.
+struct Stopping;
+
+impl Host for Stopping {
+    fn for_each(&self, n: usize, body: &(dyn Fn(usize) + Sync)) {
+        (0..n).for_each(body);
+    }
+
+    fn progress(&self, _: u64, _: u64) -> Result<(), Stopped> {
+        Err(Stopped)
+    }
+}
+
+#[test]
+fn a_stop_is_obeyed() {
+    let field = formula(DECCUBE);
+    let ctx = Ctx { field: &field, domain: cube(1.2), host: &Stopping };
+    let stage = Polygonize::prepare(&ctx, &with_faces(1000), ()).unwrap();
+    let stopped = stage.process(&ctx, (), (), &Task::default());
+    assert_eq!(stopped, Err(PolygonizeError::Stopped(Stopped)));
 }
