@@ -6,7 +6,7 @@ mod error;
 mod obj;
 
 pub use error::ImportError;
-pub use obj::{ObjError, parse_obj};
+pub use obj::{ObjError, ObjRows, parse_obj};
 
 use isospline_artifact::kinds::{Mesh, MeshView, TopologyProof};
 use isospline_geometry::TriangleMesh;
@@ -58,7 +58,7 @@ impl Stage for Import {
             return Err(ImportError::open(&mesh, h as u32));
         }
         let mut counters = Counters::default();
-        if mesh.volume() < 0.0 {
+        if volume(&mesh) < 0.0 {
             turn_inside_out(&mut mesh);
             counters.repair("faces_turned_outward", mesh.faces.len() as u64);
         }
@@ -66,6 +66,13 @@ impl Stage for Import {
             .map_err(|d| ImportError::not_manifold(&mesh, d))?;
         Ok(Piece { rows, counters })
     }
+}
+
+/// Signed volume, about a vertex: far from the origin the plain sum loses its sign.
+fn volume(mesh: &TriangleMesh) -> f64 {
+    let origin = mesh.positions[0];
+    let positions = mesh.positions.iter().map(|p| p - origin).collect();
+    TriangleMesh { positions, faces: mesh.faces.clone() }.volume()
 }
 
 fn turn_inside_out(mesh: &mut TriangleMesh) {
@@ -109,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_mesh_with_a_hole_is_refused_at_the_hole() {
-        let open: String = TETRAHEDRON.lines().take(7).map(|l| format!("{l}\n")).collect();
+        let open = TETRAHEDRON.lines().take(7).collect::<Vec<_>>().join("\n");
         let found = import(&open).unwrap_err();
         assert!(matches!(found, ImportError::Open { .. }), "{found}");
     }
@@ -123,5 +130,44 @@ mod tests {
     #[test]
     fn a_file_without_faces_is_refused() {
         assert_eq!(import("v 0 0 0\n").unwrap_err(), ImportError::Empty);
+    }
+
+    #[test]
+    fn an_inward_mesh_far_from_the_origin_is_turned() {
+        let far = "v -1e9 -1e9 -2e9\nv -999999999 -1e9 -2e9\nv -1e9 -999999999 -2e9\n\
+                   v -1e9 -1e9 -1999999999\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n";
+        let (position, face) = parse_obj(far).unwrap();
+        let positions = position.into_iter().map(Vec3::from).collect();
+        let mesh = TriangleMesh { positions, faces: face };
+        // The plain sum has lost even the sign of the sixth that the tetrahedron holds.
+        assert!(mesh.volume() > 0.0);
+        assert_eq!(import(far).unwrap().counters.repairs["faces_turned_outward"], 4);
+    }
+
+    macro_rules! fixture {
+        ($name:literal) => {
+            include_str!(concat!("../../tests/fixtures/meshes/", $name, ".obj"))
+        };
+    }
+
+    #[test]
+    fn every_fixture_mesh_has_its_faces_and_its_genus() {
+        for (text, n_faces, euler) in [
+            (fixture!("icosphere_80"), 80, 2),
+            (fixture!("icosphere_320"), 320, 2),
+            (fixture!("icosphere_1280"), 1280, 2),
+            (fixture!("torus_20x10"), 400, 0),
+            (fixture!("torus_600"), 600, 0),
+            (fixture!("dodecahedron_1200"), 1200, 2),
+            (fixture!("double_torus_1800"), 1800, -2),
+            (fixture!("deccube_5000"), 5000, -24),
+            (fixture!("chair_4000"), 4000, -4),
+        ] {
+            let Piece { rows, counters } = import(text).unwrap();
+            let topology = rows.topology[0];
+            assert_eq!((rows.face.len(), topology.euler_characteristic), (n_faces, euler));
+            assert_eq!((topology.components, topology.proof), (1, TopologyProof::Imported.code()));
+            assert!(counters.repairs.is_empty());
+        }
     }
 }

@@ -29,13 +29,16 @@ pub enum ObjError {
     },
 }
 
-/// Positions and faces (numbered from 0) of an OBJ text.
+/// Positions, and the corners of each face numbered from 0.
+pub type ObjRows = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+
+/// Positions and faces of an OBJ text.
 ///
 /// Corners may be `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative indices count backwards.
 ///
 /// # Errors
 /// The first line that cannot be read.
-pub fn parse_obj(text: &str) -> Result<(Vec<[f64; 3]>, Vec<[u32; 3]>), ObjError> {
+pub fn parse_obj(text: &str) -> Result<ObjRows, ObjError> {
     let (mut positions, mut faces) = (Vec::new(), Vec::new());
     for (at, content) in text.lines().enumerate() {
         let line = at + 1;
@@ -87,7 +90,7 @@ mod tests {
         let text = "# comment\r\nv 0 0 0 1.0\nv 1 0 0\nv 0 1e0 -0.5\nvn 0 0 1\n\
                     f 1 2/7 3//1\nf -3/1/1 -2 -1\n";
         let (positions, faces) = parse_obj(text).unwrap();
-        assert_eq!(positions[2], [0.0, 1.0, -0.5]);
+        assert_eq!(positions[2].map(f64::to_bits), [0.0, 1.0, -0.5].map(f64::to_bits));
         assert_eq!(faces, [[0, 1, 2], [0, 1, 2]]);
     }
 
