@@ -62,8 +62,9 @@ impl Diagnosis for AdaptError {
 
     fn place(&self) -> Option<Vec3> {
         match self {
-            Self::Unfit { place, .. } | Self::SingularPoint { place } => Some(*place),
-            Self::Freeze(FreezeError::NoNormal { place, .. }) => Some(*place),
+            Self::Unfit { place, .. }
+            | Self::SingularPoint { place }
+            | Self::Freeze(FreezeError::NoNormal { place, .. }) => Some(*place),
             Self::Freeze(FreezeError::Open { from, .. }) => Some(*from),
             _ => None,
         }

@@ -84,7 +84,9 @@ fn frames(
     field.gradients(&mesh.positions, &mut jets);
     let mut sheet = vec![0; mesh.positions.len()];
     for (face, c) in mesh.faces.iter().zip(component) {
-        face.iter().for_each(|&v| sheet[v as usize] = *c);
+        for &v in face {
+            sheet[v as usize] = *c;
+        }
     }
     let frame = |v: usize| {
         let gradient = jets[v].gradient;

@@ -2,6 +2,7 @@
 
 use crate::AdaptParams;
 use crate::curve_error::curve_errors;
+use crate::error_cache::{EdgeError, ErrorCache};
 use crate::gate::{Gate, quality};
 use crate::surface_mesh::SurfaceMesh;
 use crate::vertex::{Vertex, feet};
@@ -31,22 +32,26 @@ pub(crate) fn improve(
 ) -> Result<(), Stopped> {
     let gate = Gate::new(params);
     let mut best = surface.clone();
-    let mut best_error = worst(&edge_errors(surface));
+    let (mut cache, mut diagonals) = (ErrorCache::default(), ErrorCache::default());
+    let mut best_error = worst(&cache.edges(surface));
     let mut failures = 0;
     let mut edits = Counters::default();
     for round in 0..params.improve_rounds {
         ctx.host.progress(u64::from(round), u64::from(params.improve_rounds))?;
-        edits.count("edges_flipped_for_error", flip_round(surface, &gate));
-        let errors = edge_errors(surface);
+        edits.count(
+            "edges_flipped_for_error",
+            flip_round(surface, &gate, (&mut cache, &mut diagonals)),
+        );
+        let errors = cache.edges(surface);
         let (limit, n_splits) = split_limit(&errors);
         let excess = surface.mesh.face_count().saturating_sub(n_faces) / 2;
         let wanted = n_splits + excess;
         let collapsed = collapse_round(surface, &gate, &errors, (COLLAPSE_BELOW * limit, wanted));
         let room = n_faces.saturating_sub(surface.mesh.face_count()) / 2;
-        let split = split_round(surface, &gate, room);
+        let split = split_round(surface, &gate, cache.edges(surface), room);
         edits.count("vertices_collapsed_for_error", collapsed);
         edits.count("edges_split_for_error", split);
-        let error = worst(&edge_errors(surface));
+        let error = worst(&cache.edges(surface));
         if error < best_error && surface.mesh.face_count() <= n_faces.max(best.mesh.face_count()) {
             (best, best_error, failures) = (surface.clone(), error, 0);
             counters.merge(&std::mem::take(&mut edits));
@@ -70,14 +75,18 @@ pub(crate) fn trim(
 ) {
     let gate = Gate::new(params);
     // From collapses that nobody sees to any that the gate bears.
+    let mut cache = ErrorCache::default();
     for part in [0.25, 0.5, 1.0, 4.0, f64::INFINITY] {
         loop {
             let excess = surface.mesh.face_count().saturating_sub(n_faces).div_ceil(2);
-            let errors = edge_errors(surface);
+            if excess == 0 {
+                return;
+            }
+            let errors = cache.edges(surface);
             let limit = part * worst(&errors);
             let collapsed = collapse_round(surface, &gate, &errors, (limit, excess));
             counters.repair("vertices_collapsed_for_count", collapsed);
-            if excess == 0 || collapsed == 0 {
+            if collapsed == 0 {
                 break;
             }
         }
@@ -86,16 +95,7 @@ pub(crate) fn trim(
 
 /// Largest error of an edge curve, times the diagonal.
 pub(crate) fn worst_curve_error_rel(surface: &SurfaceMesh<'_>) -> f64 {
-    worst(&edge_errors(surface)) / surface.diagonal
-}
-
-/// Each edge with the error of its curve.
-type EdgeError = (HalfEdge, f64);
-
-fn edge_errors(surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
-    let edges: Vec<HalfEdge> = surface.mesh.edges().collect();
-    let ends: Vec<[&Vertex; 2]> = edges.iter().map(|&h| surface.ends(h)).collect();
-    edges.iter().copied().zip(curve_errors(surface.field, &ends)).collect()
+    worst(&ErrorCache::default().edges(surface)) / surface.diagonal
 }
 
 fn worst(errors: &[EdgeError]) -> f64 {
@@ -112,14 +112,14 @@ fn split_limit(errors: &[EdgeError]) -> (f64, usize) {
 }
 
 /// Turns edges whose other diagonal has the better curve; worst first.
-fn flip_round(surface: &mut SurfaceMesh<'_>, gate: &Gate) -> u64 {
-    let errors = edge_errors(surface);
-    let turned: Vec<[&Vertex; 2]> = errors
-        .iter()
-        .map(|&(h, _)| surface.wings(h).map_or(surface.ends(h), |w| w.map(|v| surface.at(v))))
-        .collect();
-    let others = curve_errors(surface.field, &turned);
-    let gains = errors.iter().zip(others).filter(|((_, now), then)| FLIP_GAIN * then < *now);
+fn flip_round(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    (cache, diagonals): (&mut ErrorCache, &mut ErrorCache),
+) -> u64 {
+    let (errors, others) = (cache.edges(surface), diagonals.diagonals(surface));
+    let pairs = errors.iter().zip(&others);
+    let gains = pairs.filter(|((_, now), (_, then))| FLIP_GAIN * then < *now);
     let mut gains: Vec<EdgeError> = gains.map(|(&edge, _)| edge).collect();
     gains.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
     let mut touched = vec![false; surface.mesh.face_rows()];
@@ -131,7 +131,9 @@ fn flip_round(surface: &mut SurfaceMesh<'_>, gate: &Gate) -> u64 {
             continue;
         }
         surface.mesh.flip(h);
-        faces.iter().for_each(|&f| touched[f] = true);
+        for f in faces {
+            touched[f] = true;
+        }
         n_flips += 1;
     }
     n_flips
@@ -190,7 +192,9 @@ fn collapse_round(
         }
         // The surroundings are as they were, but the link condition may look beyond them.
         if surface.collapse_cost(gate, *h, merged).is_some_and(|after| after < ROOM) {
-            around.iter().for_each(|&v| touched[v as usize] = true);
+            for v in around {
+                touched[v as usize] = true;
+            }
             touched[surface.mesh.target(*h) as usize] = true;
             surface.collapse(*h, *merged);
             n_collapsed += 1;
@@ -240,8 +244,12 @@ fn ring<'s>(surface: &'s SurfaceMesh<'_>, h: HalfEdge) -> impl Iterator<Item = u
 }
 
 /// Splits up to `n_room` edges, the worst that can be, none beside another.
-fn split_round(surface: &mut SurfaceMesh<'_>, gate: &Gate, n_room: usize) -> u64 {
-    let mut bad = edge_errors(surface);
+fn split_round(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    mut bad: Vec<EdgeError>,
+    n_room: usize,
+) -> u64 {
     bad.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
     bad.truncate(12 * n_room);
     let middles: Vec<_> = bad.iter().map(|&(h, _)| surface.middle(h)).collect();
@@ -259,7 +267,9 @@ fn split_round(surface: &mut SurfaceMesh<'_>, gate: &Gate, n_room: usize) -> u64
             continue;
         }
         if surface.split(h, *middle).is_some() {
-            around.iter().for_each(|&v| touched[v as usize] = true);
+            for v in around {
+                touched[v as usize] = true;
+            }
             n_split += 1;
         }
     }

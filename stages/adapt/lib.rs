@@ -7,6 +7,7 @@
 
 mod curve_error;
 mod error;
+mod error_cache;
 pub mod freeze;
 mod gate;
 mod improve;

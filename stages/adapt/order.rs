@@ -1,6 +1,6 @@
 //! A numbering in which neighbours stand close together.
 //!
-//! Vertices follow a breadth-first front (Cuthill and McKee 1969) from a pseudo-peripheral vertex
+//! Vertices follow a breadth-first front (Cuthill and `McKee` 1969) from a pseudo-peripheral vertex
 //! of each component, faces and edges follow their lowest vertices. A row of a later stage then
 //! needs only rows a little further on, which is what lets stages run behind each other; a
 //! space-filling curve would make early rows wait for most of their source.

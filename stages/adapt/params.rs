@@ -27,7 +27,8 @@ pub struct AdaptParams {
     pub max_rounds: u32,
     /// When a fit mesh is improved.
     pub improve: Improve,
-    /// Rounds of improvement at most, 0 to 1000.
+    /// Rounds of improvement at most, 0 to 1000. On deccube the first four bring the error from
+    /// 5e-4 to 7e-5; later ones help small meshes, until the interior of the patches decides.
     pub improve_rounds: u32,
 }
 

@@ -17,13 +17,16 @@ pub(crate) struct SurfaceMesh<'a> {
     pub(crate) diagonal: f64,
     pub(crate) mesh: EditMesh,
     pub(crate) vertices: Vec<Vertex>,
+    /// How often each vertex has moved.
+    pub(crate) moves: Vec<u32>,
 }
 
 impl<'a> SurfaceMesh<'a> {
     pub(crate) fn new(field: &'a dyn Field, mesh: TriangleMesh) -> Result<Self, AdaptError> {
         let diagonal = mesh.bounds().diagonal();
         let vertices = vertices_at(field, &mesh.positions)?;
-        Ok(Self { field, diagonal, mesh: EditMesh::new(mesh)?, vertices })
+        let moves = vec![0; vertices.len()];
+        Ok(Self { field, diagonal, mesh: EditMesh::new(mesh)?, vertices, moves })
     }
 
     pub(crate) fn at(&self, vertex: u32) -> &Vertex {
@@ -58,7 +61,7 @@ impl<'a> SurfaceMesh<'a> {
 
     /// Worst of the faces about a vertex.
     pub(crate) fn fan_cost(&self, gate: &Gate, vertex: u32) -> f64 {
-        let faces = self.mesh.spokes(vertex).map(|h| h.face());
+        let faces = self.mesh.spokes(vertex).map(HalfEdge::face);
         faces.map(|f| gate.face_with_quality(&self.corners(f))).fold(0.0, f64::max)
     }
 
@@ -69,6 +72,7 @@ impl<'a> SurfaceMesh<'a> {
 
     pub(crate) fn place(&mut self, vertex: u32, moved: Vertex) {
         self.vertices[vertex as usize] = moved;
+        self.moves[vertex as usize] += 1;
         self.mesh.positions[vertex as usize] = moved.position;
     }
 
@@ -118,6 +122,7 @@ impl<'a> SurfaceMesh<'a> {
     pub(crate) fn split(&mut self, h: HalfEdge, middle: Vertex) -> Option<u32> {
         let vertex = self.mesh.split(h, middle.position)?;
         self.vertices.push(middle);
+        self.moves.push(0);
         Some(vertex)
     }
 

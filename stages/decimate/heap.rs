@@ -71,7 +71,9 @@ mod tests {
         fn words_come_out_sorted(start in prop::collection::vec(0u64..50, 0..40),
                                  more in prop::collection::vec(0u64..50, 0..40)) {
             let mut heap = WordHeap::from_words(start.clone());
-            more.iter().for_each(|&w| heap.push(w));
+            for &w in &more {
+                heap.push(w);
+            }
             let mut expected = [start, more].concat();
             expected.sort_unstable();
             let popped: Vec<u64> = std::iter::from_fn(|| heap.pop()).collect();

@@ -1,4 +1,5 @@
 //! Decimation of closed forms: topology, number of faces, fitness, errors.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
 use isospline_artifact::kinds::{Mesh, TopologyProof};
 use isospline_decimate::{Decimate, DecimateError, DecimateParams};
