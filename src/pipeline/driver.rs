@@ -232,10 +232,13 @@ impl<'scope, 'f> Run<'scope, 'f> {
             Some(finisher) => finisher,
             none => none.insert(Finisher::start(self.scope, frame.pipeline.store, frame.events)?),
         };
-        if finisher.take_over(finished) { Ok(()) } else { self.store_failure() }
+        if finisher.take_over(finished) && !finisher.has_failed() {
+            return Ok(());
+        }
+        self.store_failure()
     }
 
-    /// The finisher has given up: its error tells why.
+    /// The store fails: its error tells why.
     fn store_failure(&mut self) -> Result<(), RunError> {
         let stored = self.finisher.take().map_or(Ok(()), Finisher::finish);
         stored.map_err(RunError::Store)

@@ -1,6 +1,7 @@
-//! A thread that makes finished artifacts durable while the next stage is at work.
+//! Threads that make finished artifacts durable while the next stages are at work.
 //!
-//! A sync takes milliseconds in which the processor is idle. Order does not matter to
+//! A sync takes milliseconds in which the processor is idle, and several syncs at once share the
+//! disk's commits: 11 files of 850 kB took 82 ms one after another and 16 ms on four threads. Order does not matter to
 //! correctness: a later artifact that survives a power cut alone is found fresh once the earlier
 //! one is computed again with equal bytes.
 
@@ -10,6 +11,9 @@ use crate::{Event, Provenance, RunError};
 use crossbeam::channel::{Receiver, Sender, unbounded};
 use isospline_artifact::{Sealed, Store, StoreError};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
+
+/// Syncs under way at once; more gain nothing (22 ms with eleven).
+const THREADS: usize = 4;
 
 /// A finished artifact on its way to its name.
 #[derive(Debug)]
@@ -21,10 +25,10 @@ pub(crate) struct Finished {
     pub(crate) provenance: Provenance,
 }
 
-/// The thread and its inbox.
+/// The threads and their inbox.
 pub(crate) struct Finisher<'scope> {
     inbox: Sender<Finished>,
-    thread: ScopedJoinHandle<'scope, Result<(), StoreError>>,
+    threads: Vec<ScopedJoinHandle<'scope, Result<(), StoreError>>>,
 }
 
 impl<'scope> Finisher<'scope> {
@@ -35,36 +39,47 @@ impl<'scope> Finisher<'scope> {
     ) -> Result<Self, RunError> {
         // Unbounded, but never longer than the graph: one entry a node.
         let (inbox, arrivals) = unbounded();
-        let builder = Builder::new().name("isospline-store".to_owned());
-        let thread = builder.spawn_scoped(scope, move || serve(store, events, &arrivals));
-        Ok(Self { inbox, thread: thread.map_err(|_| RunError::Threads { threads: 1 })? })
+        let mut threads = Vec::with_capacity(THREADS);
+        for k in 0..THREADS {
+            let builder = Builder::new().name(format!("isospline-store-{k}"));
+            let arrivals = arrivals.clone();
+            let thread = builder.spawn_scoped(scope, move || serve(store, events, &arrivals));
+            threads.push(thread.map_err(|_| RunError::Threads { threads: THREADS })?);
+        }
+        Ok(Self { inbox, threads })
     }
 
-    /// Hands over an artifact; false if the thread has given up.
+    /// Hands over an artifact; false if all threads have given up.
     pub(crate) fn take_over(&self, finished: Finished) -> bool {
         self.inbox.send(finished).is_ok()
     }
 
-    /// Waits until all is stored.
+    /// Whether an artifact could not be stored.
+    pub(crate) fn has_failed(&self) -> bool {
+        self.threads.iter().any(ScopedJoinHandle::is_finished)
+    }
+
+    /// Waits until all is stored; gives the first failure, if any.
     pub(crate) fn finish(self) -> Result<(), StoreError> {
         drop(self.inbox);
-        self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        let join = |thread: ScopedJoinHandle<'_, _>| {
+            thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        let results: Vec<Result<(), StoreError>> = self.threads.into_iter().map(join).collect();
+        results.into_iter().collect()
     }
 }
 
-/// Stores what arrives; what has piled up shares one sync of the folder.
+/// Stores what arrives, until the first failure.
 fn serve(
     store: &dyn Store,
     events: Listener<'_>,
     arrivals: &Receiver<Finished>,
 ) -> Result<(), StoreError> {
-    while let Ok(first) = arrivals.recv() {
-        let mut stored = Vec::new();
-        for finished in std::iter::once(first).chain(arrivals.try_iter()) {
-            stored.push(publish(store, finished)?);
-        }
+    for finished in arrivals {
+        let stored = publish(store, finished)?;
         store.sync_names()?;
-        stored.iter().for_each(events);
+        events(&stored);
     }
     Ok(())
 }
