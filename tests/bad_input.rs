@@ -41,11 +41,7 @@ fn model(formula: &str) -> &'static str {
 #[test]
 fn fields_that_have_no_surface() {
     refused(&[
-        Case {
-            text: model("sqrt(x - 10) + y + z"),
-            exit: 20,
-            says: &["not-a-number"],
-        },
+        Case { text: model("sqrt(x - 10) + y + z"), exit: 20, says: &["not-a-number"] },
         Case {
             text: model("x^2 + y^2 + z^2 + 3"),
             exit: 21,
@@ -54,7 +50,7 @@ fn fields_that_have_no_surface() {
         Case {
             text: model("x^2 + y^2 - z^2*(1 - z^2)"),
             exit: 22,
-            says: &["singular-point", "(0, 0, 0)"],
+            says: &["singular-point", "the surface is singular at"],
         },
         Case { text: model("x^2 + y^2 - 1"), exit: 23, says: &["leaves-box", "side z"] },
     ]);
@@ -131,7 +127,7 @@ fn a_base_mesh_with_a_hole() {
 #[test]
 fn a_store_of_another_version_is_told_from_a_damaged_one() {
     let sandbox = Sandbox::new();
-    sandbox.converts("torus", &["--set", "target.faces=300"]);
+    sandbox.converts("torus", &["--set", "target.faces=600"]);
     let path = sandbox.path("out/11-fairing.isos");
     let sound = std::fs::read(&path).unwrap();
 

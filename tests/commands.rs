@@ -4,7 +4,7 @@ use isospline_tests::{Sandbox, config_path, root};
 use std::io::Read;
 use std::process::Stdio;
 
-const SMALL: [&str; 2] = ["--set", "target.faces=300"];
+const SMALL: [&str; 2] = ["--set", "target.faces=600"];
 
 #[test]
 fn a_formula_alone_becomes_a_surface() {
@@ -21,7 +21,8 @@ fn a_turned_sign_gives_the_same_surface_and_is_told() {
     let faces = "target.faces=200";
     let run = |formula: &str| {
         let sandbox = Sandbox::new();
-        let outcome = sandbox.succeeds(&["run", "--formula", formula, "--set", faces, "--out", "out"]);
+        let outcome =
+            sandbox.succeeds(&["run", "--formula", formula, "--set", faces, "--out", "out"]);
         (sandbox, outcome.stderr)
     };
     let (plain, _) = run("x^2 + y^2 + z^2 - 1");
@@ -68,8 +69,7 @@ fn an_npz_export_has_the_figures_of_its_folder() {
     sandbox.converts("torus", &SMALL);
     sandbox.succeeds(&["export", "out", "--format", "npz", "-o", "torus.npz"]);
     let config = config_path("torus");
-    let outcome =
-        sandbox.isospline(&["check", "torus.npz", "--model", config.as_str(), "--json"]);
+    let outcome = sandbox.isospline(&["check", "torus.npz", "--model", config.as_str(), "--json"]);
     let npz: serde_json::Value = serde_json::from_str(&outcome.stdout).unwrap();
     let mut folder = sandbox.checked();
     // Repairs are counted by stages; an export does not hold them.
@@ -99,7 +99,8 @@ fn inspect_tells_what_an_artifact_holds() {
     let sandbox = Sandbox::new();
     sandbox.converts("torus", &SMALL);
     let told = sandbox.succeeds(&["inspect", "--verify", "out/07-network.isos"]).stdout;
-    for word in ["kind       network", "control", "\"samples\":17", "curve_iterations", "checksums"] {
+    for word in ["kind       network", "control", "\"samples\":17", "curve_iterations", "checksums"]
+    {
         assert!(told.contains(word), "no {word:?} in\n{told}");
     }
 }

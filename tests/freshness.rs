@@ -2,7 +2,7 @@
 
 use isospline_tests::Sandbox;
 
-const FACES: [&str; 2] = ["--set", "target.faces=300"];
+const FACES: [&str; 2] = ["--set", "target.faces=600"];
 
 /// Stages that a run computed.
 fn computed(stdout: &str) -> Vec<String> {
@@ -50,7 +50,7 @@ fn names_comments_and_spacing_do_not_count() {
     let torus = |name: &str, formula: &str| {
         let text = format!(
             "[model]\nname = \"{name}\"\nunit = \"{name}\"\nformula = \"{formula}\"\n\
-             box = [[-6.6, 6.6], [-6.6, 6.6], [-1.1, 1.1]]\n[target]\nfaces = 300\n"
+             box = [[-6.6, 6.6], [-6.6, 6.6], [-1.1, 1.1]]\n[target]\nfaces = 600\n"
         );
         sandbox.write("model.toml", text);
         let args = ["run", "model.toml", "--out", "out", "--no-sync", "--json"];
@@ -82,7 +82,7 @@ fn a_stage_runs_alone_once_what_it_reads_is_fresh() {
     let sandbox = Sandbox::new();
     let config = isospline_tests::config_path("torus");
     let stage = |name: &str| {
-        let args = ["stage", name, config.as_str(), "--out", "out", "--set", "target.faces=300"];
+        let args = ["stage", name, config.as_str(), "--out", "out", "--set", "target.faces=600"];
         sandbox.isospline(&args)
     };
     let early = stage("network");

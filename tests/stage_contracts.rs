@@ -2,9 +2,7 @@
 //! work is cut and ordered, and no look at rows that it did not ask for.
 
 use isospline_adapt::freeze::freeze;
-use isospline_artifact::kinds::{
-    BaseMesh, Curvature, EdgeSystems, G0Fit, Network, VertexSystems,
-};
+use isospline_artifact::kinds::{BaseMesh, Curvature, EdgeSystems, G0Fit, Network, VertexSystems};
 use isospline_artifact::{Artifact, SectionSource};
 use isospline_curvature::CurvatureStage;
 use isospline_edge_systems::EdgeSystemsStage;

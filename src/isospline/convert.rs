@@ -1,12 +1,11 @@
 //! A caller's own field becomes a surface in memory.
 
 use crate::config::{ConfigError, Inside, StageParams};
-use crate::model::oriented;
+use crate::model::{given_mesh, oriented};
 use crate::stages;
-use isospline_artifact::kinds::{Mesh, Patches, PatchesView, TopologyProof};
+use isospline_artifact::kinds::{Mesh, Patches, PatchesView};
 use isospline_artifact::{Container, MemoryStore, StoreError};
 use isospline_check::{CheckParams, CheckReport, Expected, Job, Surface, SurfaceError};
-use isospline_geometry::triangle_mesh::Defect;
 use isospline_geometry::{Aabb, TriangleMesh};
 use isospline_implicit::{Field, InsideError, Oriented};
 use isospline_pipeline::{
@@ -63,9 +62,6 @@ pub enum ConvertError {
     /// A parameter out of its range.
     #[error(transparent)]
     Params(#[from] ConfigError),
-    /// The base mesh is not closed and oriented.
-    #[error("the base mesh is not closed and oriented: {0:?}")]
-    BaseMesh(Defect),
     /// The side of the surface cannot be told.
     #[error(transparent)]
     Inside(#[from] InsideError),
@@ -127,7 +123,7 @@ pub fn convert_with_events<'f>(
 ) -> Result<Conversion<&'f dyn Field>, ConvertError> {
     let field = oriented(field, options.level, options.inside, &options.domain)?;
     let registry = stages::registry();
-    let base_mesh = options.base_mesh.as_ref().map(given).transpose()?;
+    let base_mesh = options.base_mesh.as_ref().map(given);
     let params = options.stages.with_faces(options.faces);
     let graph = stages::graph(&registry, &params, base_mesh.as_ref());
     let key = ModelKey { name: "closure".to_owned(), content: BTreeMap::new(), hashable: false };
@@ -184,9 +180,9 @@ impl<F: Field> Conversion<F> {
     }
 }
 
-fn given(mesh: &TriangleMesh) -> Result<Given, ConvertError> {
-    let rows = Mesh::from_triangles(mesh, TopologyProof::Imported);
-    Ok(Given::new("base mesh", rows.map_err(ConvertError::BaseMesh)?))
+fn given(mesh: &TriangleMesh) -> Given {
+    let position = mesh.positions.iter().map(|&p| p.into()).collect();
+    given_mesh("base mesh".to_owned(), position, mesh.faces.clone())
 }
 
 fn opened(

@@ -1,13 +1,15 @@
 //! A model file becomes a field, a box and a base mesh: what the stages work on.
 
 use crate::config::{ConfigError, Domain, Inside, ModelFile};
+use isospline_artifact::kinds::{Mesh, Topology};
 use isospline_geometry::Aabb;
 use isospline_implicit::{
     BoundsError, Field, Formula, FormulaError, InsideError, Oriented, auto_box, resolve_inside,
 };
+use isospline_import::{ObjError, parse_obj};
 use isospline_pipeline::{Given, ModelKey};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a model cannot be worked on.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +38,14 @@ pub enum ModelError {
         path: PathBuf,
         /// Why.
         source: std::io::Error,
+    },
+    /// The base mesh is no triangle mesh.
+    #[error("{}: {error}", path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and where.
+        error: ObjError,
     },
 }
 
@@ -73,7 +83,7 @@ impl Model {
             None => auto_box(&level, model.box_limit)?,
         };
         let field = oriented(formula, model.level, model.inside, &domain)?;
-        let base_mesh = None;
+        let base_mesh = model.base_mesh.as_deref().map(read_base_mesh).transpose()?;
         Ok(Self { file, field, domain, base_mesh })
     }
 
@@ -110,6 +120,20 @@ impl Model {
         }
         remarks
     }
+}
+
+fn read_base_mesh(path: &Path) -> Result<Given, ModelError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| ModelError::MeshUnreadable { path: path.to_owned(), source })?;
+    let (position, face) =
+        parse_obj(&text).map_err(|error| ModelError::Mesh { path: path.to_owned(), error })?;
+    Ok(given_mesh(path.display().to_string(), position, face))
+}
+
+/// Rows for stage import, which finds out what they are worth.
+pub(crate) fn given_mesh(label: String, position: Vec<[f64; 3]>, face: Vec<[u32; 3]>) -> Given {
+    let component = vec![0; face.len()];
+    Given::new(label, Mesh { position, face, component, topology: vec![Topology::default()] })
 }
 
 /// `field - level`, turned so that `f < 0` inside.

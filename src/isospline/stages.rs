@@ -6,6 +6,7 @@ use isospline_pipeline::{Given, Graph, Node, Registry};
 /// Every stage, in the order that numbers the files.
 pub fn registry() -> Registry {
     Registry::new()
+        .with::<isospline_import::Import>()
         .with::<isospline_polygonize::Polygonize>()
         .with::<isospline_decimate::Decimate>()
         .with::<isospline_project::Project>()

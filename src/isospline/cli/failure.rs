@@ -55,12 +55,15 @@ const BUG: u8 = 70;
 pub(crate) const STOPPED: u8 = 130;
 
 /// Exit codes of the stages' own error codes; others are [`OTHER_SURFACE`].
-const STAGE_EXITS: [(&str, u8); 7] = [
+const STAGE_EXITS: [(&str, u8); 10] = [
     ("not-a-number", NOT_A_NUMBER),
     ("empty-level-set", EMPTY),
     ("singular-point", SINGULAR),
     ("leaves-box", LEAVES_BOX),
     ("too-few-faces", TOO_FEW_FACES),
+    ("mesh-empty", BAD_BASE_MESH),
+    ("mesh-not-manifold", BAD_BASE_MESH),
+    ("mesh-open", BAD_BASE_MESH),
     ("not-manifold", BAD_BASE_MESH),
     ("stopped", STOPPED),
 ];
@@ -211,6 +214,8 @@ impl From<ModelError> for Failure {
             }
             ModelError::MeshUnreadable { .. } => Self::new(UNREADABLE, "base-mesh", message)
                 .helped("model.base_mesh is relative to the model file"),
+            ModelError::Mesh { .. } => Self::new(BAD_BASE_MESH, "base-mesh", message)
+                .helped("the base mesh is an OBJ of triangles"),
         }
     }
 }

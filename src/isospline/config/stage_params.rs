@@ -51,6 +51,7 @@ macro_rules! stage_params {
 }
 
 stage_params! {
+    import: isospline_import::ImportParams,
     polygonize: isospline_polygonize::PolygonizeParams,
     decimate: isospline_decimate::DecimateParams,
     project: isospline_project::ProjectParams,
