@@ -1,9 +1,10 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench golden docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench docs clean
 
 CARGO ?= cargo
-ISOSPLINE := target/release/isospline
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+ISOSPLINE := $(TARGET)/release/isospline
 # The models of [TK] Fig. 9-15, in its order.
 PAPER := torus_regular torus dodecahedron double_torus mcmullen chair deccube
 
@@ -42,11 +43,8 @@ bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50
 	$(CARGO) bench --workspace
 	$(CARGO) run --release -q -p isospline --example stage_times
 
-golden: ## rewrite tests/golden; review the diff
-	ISOSPLINE_GOLDEN=rewrite $(CARGO) test -p isospline-tests --test golden
-
 docs: ## build the API documentation, target/doc/isospline/index.html
 	$(CARGO) doc --workspace --no-deps -q
 
 clean: ## remove target, out and the readers' environment
-	rm -rf target out .venv
+	rm -rf $(TARGET) out .venv

@@ -52,7 +52,7 @@ fn fields_that_have_no_surface() {
             exit: 22,
             says: &["singular-point", "the surface is singular at"],
         },
-        Case { text: model("x^2 + y^2 - 1"), exit: 23, says: &["leaves-box", "side z"] },
+        Case { text: model("x^2 + y^2 - 1"), exit: 23, says: &["leaves-box", "through z-"] },
     ]);
 }
 

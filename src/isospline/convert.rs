@@ -12,6 +12,7 @@ use isospline_pipeline::{
     Event, Given, Graph, ModelKey, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
 };
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Arc;
 
 /// What to convert a field with.
@@ -77,14 +78,20 @@ pub enum ConvertError {
 }
 
 /// A converted field.
-#[derive(Debug)]
-pub struct Conversion<F> {
+pub struct Conversion<'f> {
     /// The field as converted: level at zero, `f < 0` inside.
-    pub field: Oriented<F>,
+    pub field: Oriented<&'f dyn Field>,
     /// Stages, times and counters.
     pub report: RunReport,
     patches: Arc<Container>,
     expected: Expected,
+}
+
+impl fmt::Debug for Conversion<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut out = f.debug_struct("Conversion");
+        out.field("report", &self.report).field("expected", &self.expected).finish_non_exhaustive()
+    }
 }
 
 /// Converts `field` into a watertight G1 surface of degree-7 triangular Bézier patches.
@@ -108,7 +115,7 @@ pub struct Conversion<F> {
 pub fn convert<'f>(
     field: &'f dyn Field,
     options: &Options<'_>,
-) -> Result<Conversion<&'f dyn Field>, ConvertError> {
+) -> Result<Conversion<'f>, ConvertError> {
     convert_with_events(field, options, &|_| ())
 }
 
@@ -120,7 +127,7 @@ pub fn convert_with_events<'f>(
     field: &'f dyn Field,
     options: &Options<'_>,
     on_event: &(dyn Fn(&Event) + Sync),
-) -> Result<Conversion<&'f dyn Field>, ConvertError> {
+) -> Result<Conversion<'f>, ConvertError> {
     let field = oriented(field, options.level, options.inside, &options.domain)?;
     let registry = stages::registry();
     let base_mesh = options.base_mesh.as_ref().map(given);
@@ -144,7 +151,7 @@ pub fn convert_with_events<'f>(
     Ok(Conversion { field, report, patches, expected })
 }
 
-impl<F: Field> Conversion<F> {
+impl Conversion<'_> {
     /// The finished surface.
     ///
     /// # Errors

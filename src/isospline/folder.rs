@@ -4,7 +4,7 @@ use crate::config::ModelFile;
 use crate::{Model, ModelError, stages};
 use isospline_artifact::kinds::{Mesh, Patches, Topology, TopologyProof};
 use isospline_artifact::{Artifact, Container, Durability, FolderStore, Store, StoreError};
-use isospline_check::{CheckReport, Expected, ForEach, Job, Surface, SurfaceError};
+use isospline_check::{CheckReport, Expected, Job, Surface, SurfaceError, on_this_thread};
 use isospline_pipeline::{
     Event, Graph, ModelKey, NodeStatus, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
     read_provenance,
@@ -116,7 +116,7 @@ impl ModelFolder {
     ///
     /// # Errors
     /// [`FolderError::Store`], [`FolderError::Surface`].
-    pub fn check(&self, threads: ForEach<'_>) -> Result<CheckReport, FolderError> {
+    pub fn check(&self) -> Result<CheckReport, FolderError> {
         let container = self.patches()?;
         let surface = Surface::from_patches(&container.view::<Patches>()?)?;
         let job = Job {
@@ -126,7 +126,7 @@ impl ModelFolder {
             params: &self.model.file.check,
             repairs: self.repairs()?,
         };
-        Ok(isospline_check::check(&job, threads))
+        Ok(isospline_check::check(&job, &on_this_thread))
     }
 
     /// Counters of every fallback that a stage took, as `stage.name`.

@@ -16,8 +16,3 @@ pub use isospline_check::{CheckParams, CheckReport};
 pub use isospline_geometry::{Aabb, TriangleMesh, Vec3};
 pub use isospline_implicit::{ClosureField, Field, InsideError};
 pub use model::{Model, ModelError};
-
-/// Threads for the checker, as it takes them.
-pub fn lent_threads(_threads: usize) -> impl Fn(usize, &(dyn Fn(usize) + Sync)) {
-    isospline_check::on_this_thread
-}

@@ -6,9 +6,9 @@ use crate::cli::output::{note, say};
 use crate::cli::tables;
 use isospline::config::ModelFile;
 use isospline::{Model, ModelFolder};
-use isospline_check::{CheckReport, Expected, Job, Surface};
+use isospline_check::{CheckReport, Expected, Job, Surface, on_this_thread};
 use isospline_export::NpzError;
-use isospline_pipeline::{RunOptions, State};
+use isospline_pipeline::State;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -37,8 +37,7 @@ fn check_folder(path: &Path) -> Result<(CheckReport, ModelFile), Failure> {
     if let Some(last) = status.last().filter(|last| matches!(last.state, State::Stale(_))) {
         note(&format!("warning: {last}; the figures are those of the surface as it was made"));
     }
-    let threads = isospline::lent_threads(RunOptions::default().threads);
-    let report = folder.check(&threads)?;
+    let report = folder.check()?;
     Ok((report, folder.model().file.clone()))
 }
 
@@ -59,6 +58,5 @@ fn check_export(path: &Path, model: &Path) -> Result<(CheckReport, ModelFile), F
         params: &model.file.check,
         repairs: BTreeMap::new(),
     };
-    let threads = isospline::lent_threads(RunOptions::default().threads);
-    Ok((isospline_check::check(&job, &threads), model.file))
+    Ok((isospline_check::check(&job, &on_this_thread), model.file))
 }
