@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         print!("{head:>8}");
     }
     println!(
-        "{:>8}{:>7}{:>9}{:>9}{:>9}{:>6}{:>8}{:>9}{:>8}",
+        "{:>8}{:>7}{:>9}{:>9}{:>10}{:>6}{:>8}{:>9}{:>8}",
         "all", "iter.", "max", "rms", "G1, deg", "genus", "MB", "repairs", "check"
     );
     for folder in std::env::args().skip(1) {
@@ -56,7 +56,7 @@ fn row(report: &Value) {
     let repairs = check["repairs"].as_object();
     let repairs: u64 = repairs.into_iter().flatten().filter_map(|(_, n)| n.as_u64()).sum();
     println!(
-        "{:>8.1}{:>7.2}{:>9}{:>9}{:>9}{:>6}{:>8.1}{repairs:>9}{:>8}",
+        "{:>8.1}{:>7.2}{:>9}{:>9}{:>10}{:>6}{:>8.1}{repairs:>9}{:>8}",
         1e3 * all,
         mean.unwrap_or(f64::NAN),
         small("rel_error_max"),
