@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 fn row(report: &Value) {
     let check = &report["check"];
-    print!("{:<14}{:>6}", report["model"].as_str().unwrap_or("?"), check["faces"]);
+    print!("{:<14}{:>6}", report["model"].as_str().unwrap_or("?"), check["faces"].to_string());
     let times: Vec<Option<f64>> =
         STAGES.iter().map(|name| stage(report, name)?["seconds"].as_f64()).collect();
     for time in &times {
@@ -62,7 +62,7 @@ fn row(report: &Value) {
         small("rel_error_max"),
         small("rel_error_rms"),
         small("g1_angle_deg_max"),
-        check["genus"],
+        check["genus"].to_string(),
         report["peak_resident_bytes"].as_f64().unwrap_or(f64::NAN) / 1e6,
         if check["pass"] == true { "passed" } else { "FAILED" },
     );
