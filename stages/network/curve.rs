@@ -21,13 +21,18 @@ const STEP_TOLERANCE: f64 = 1e-6;
 const CONDITION_TOLERANCE: f64 = 1e-13;
 /// Tangent lengths outside this range, times the chord, come only from bad base edges.
 const LENGTH_RANGE: [f64; 2] = [0.08, 0.75];
-/// What restoring the conditions may move clamped lengths past their range.
-const LENGTH_SLACK: f64 = 1e-6;
 /// Lets conditions that coincide (equal normals on planes and along rulings) be solved: both
 /// multipliers then share the load. Small beside the squared turn of normals that matter.
 const COINCIDENT: f64 = 1e-13;
-/// Farthest place of `q2` from the middle of the chord, times the chord.
-const Q2_RANGE: f64 = 1.0;
+/// Farthest place of `q2` from where least squares without conditions puts it, times the chord;
+/// sound edges stay below 0.1. Where curvature starts inside an edge, at the rim of a plane say,
+/// the conditions may be met far to the side only.
+const Q2_RANGE: f64 = 0.25;
+/// The same for curves from the table: beyond it the edge has no curve.
+const Q2_LIMIT: f64 = 1.0;
+/// Tangent lengths tried, at both ends, where the iteration finds no sound curve: short ones need
+/// less room for `q2`.
+const TABLE: [f64; 8] = [0.25, 0.18, 0.12, 0.08, 0.05, 0.03, 0.35, 0.5];
 
 /// What a curve interpolates.
 #[derive(Clone, Copy, Debug)]
@@ -58,18 +63,28 @@ pub struct Solution {
 /// Fits the curve to `targets`, one for each inner sample.
 ///
 /// Minimises the squared distances subject to `4 l^2 k0 = 3 (q2 - q0) . N0` and
-/// `4 m^2 k1 = 3 (q2 - q4) . N1` [TK, Eq. (9); Eq. (7) with `q3 = q4 - m t1`]. Lengths out of
-/// range are clamped and `q2` refitted. `None` where no sound curve meets the conditions.
+/// `4 m^2 k1 = 3 (q2 - q4) . N1` [TK, Eq. (9); Eq. (7) with `q3 = q4 - m t1`]. Where that leads to
+/// lengths out of range or a `q2` far to the side, the best of a table of lengths is taken. `None`
+/// where no sound curve meets the conditions.
 pub fn fit_curve(ends: &Ends, samples: &Samples, targets: &[Vec3]) -> Option<Solution> {
     let edge = Edge::new(ends)?;
-    let normal_equations = NormalEquations::new(&edge, samples, targets);
-    let (x, iterations) = newton_lagrange(&edge, &normal_equations);
-    let sound = x.and_then(|x| edge.restore(x)).filter(|x| edge.is_sound(x));
+    let equations = NormalEquations::new(&edge, samples, targets);
+    let free = solve(equations.a, equations.g.map(|g| -g))?;
+    let (x, iterations) = newton_lagrange(&edge, &equations, free);
+    let in_range = |l: f64| (LENGTH_RANGE[0]..=LENGTH_RANGE[1]).contains(&l);
+    let sound = x
+        .and_then(|x| edge.restore(x))
+        .filter(|x| in_range(x[0]) && in_range(x[1]) && shift(x, &free) <= Q2_RANGE);
     let (x, status) = match sound {
         Some(x) => (x, CurveStatus::Converged),
-        None => (clamped(&edge, &normal_equations, x)?, CurveStatus::Clamped),
+        None => (from_table(&edge, &equations, &free)?, CurveStatus::Clamped),
     };
     Some(edge.solution(ends, &x, iterations, status))
+}
+
+/// Distance between the `q2` of two curves.
+fn shift(x: &Unknowns, y: &Unknowns) -> f64 {
+    norm(&[x[2] - y[2], x[3] - y[3], x[4] - y[4]])
 }
 
 /// Unknowns `[l, m, q2.x, q2.y, q2.z]`, times the chord.
@@ -145,13 +160,6 @@ impl Edge {
         (largest(&self.conditions(&x)) <= CONDITION_TOLERANCE).then_some(x)
     }
 
-    fn is_sound(&self, x: &Unknowns) -> bool {
-        let [least, most] = LENGTH_RANGE;
-        let in_range = |l: f64| least - LENGTH_SLACK <= l && l <= most + LENGTH_SLACK;
-        let q2 = Vec3::new(x[2], x[3], x[4]);
-        in_range(x[0]) && in_range(x[1]) && (q2 - 0.5 * self.q4).norm() <= Q2_RANGE
-    }
-
     fn solution(
         &self,
         ends: &Ends,
@@ -209,16 +217,26 @@ impl NormalEquations {
         Self { a, g }
     }
 
+    /// Squared distance of `x` beyond that of the least-squares solution `free`.
+    fn excess(&self, x: &Unknowns, free: &Unknowns) -> f64 {
+        let d: Unknowns = std::array::from_fn(|i| x[i] - free[i]);
+        (0..5).map(|i| (0..5).map(|j| d[i] * self.a[i][j] * d[j]).sum::<f64>()).sum()
+    }
+
     /// Half the gradient of the squared distance.
     fn gradient(&self, x: &Unknowns) -> Unknowns {
         std::array::from_fn(|i| self.g[i] + (0..5).map(|j| self.a[i][j] * x[j]).sum::<f64>())
     }
 }
 
-/// Newton's method on the optimality conditions [TK, Alg. 5.1], from the plain least-squares
-/// solution. Returns the last iterate, if all solves succeeded, and the number of steps.
-fn newton_lagrange(edge: &Edge, equations: &NormalEquations) -> (Option<Unknowns>, u32) {
-    let Some(mut x) = solve(equations.a, equations.g.map(|g| -g)) else { return (None, 0) };
+/// Newton's method on the optimality conditions [TK, Alg. 5.1]. Returns the last iterate, if all
+/// solves succeeded, and the number of steps.
+fn newton_lagrange(
+    edge: &Edge,
+    equations: &NormalEquations,
+    start: Unknowns,
+) -> (Option<Unknowns>, u32) {
+    let mut x = start;
     let mut r = [0.0; 2];
     for iteration in 0..MAX_ITERATIONS {
         let Some((step, multipliers)) = kkt_step(edge, equations, &x, r) else {
@@ -265,20 +283,24 @@ fn kkt_step(
     Some(([s[0], s[1], s[2], s[3], s[4]], [s[5], s[6]]))
 }
 
-/// Lengths clamped to their range, then the best `q2` that meets the two linear conditions.
-fn clamped(edge: &Edge, equations: &NormalEquations, x: Option<Unknowns>) -> Option<Unknowns> {
-    let start = x.unwrap_or([0.25; 5]);
-    let clamp =
-        |l: f64| if l.is_finite() { l.clamp(LENGTH_RANGE[0], LENGTH_RANGE[1]) } else { 0.25 };
-    let (l, m) = (clamp(start[0]), clamp(start[1]));
+/// The curve with lengths from the table that is best in distance and in the place of `q2`.
+fn from_table(edge: &Edge, equations: &NormalEquations, free: &Unknowns) -> Option<Unknowns> {
+    let pairs = TABLE.iter().flat_map(|&l| TABLE.iter().map(move |&m| (l, m)));
+    let curves = pairs.filter_map(|(l, m)| with_lengths(edge, equations, l, m));
+    let near = curves.filter(|x| shift(x, free) <= Q2_LIMIT);
+    let cost = |x: &Unknowns| equations.excess(x, free) + shift(x, free) * shift(x, free);
+    near.min_by(|x, y| cost(x).total_cmp(&cost(y)))
+}
+
+/// The best `q2` for these lengths: the two conditions are linear in it.
+fn with_lengths(edge: &Edge, equations: &NormalEquations, l: f64, m: f64) -> Option<Unknowns> {
     let [n0, n1] = &edge.normals;
-    let weight = 2.0 * equations.a[2][2];
     let mut matrix = [[0.0; 5]; 5];
     let mut rhs = [0.0; 5];
     let fixed = equations.gradient(&[l, m, 0.0, 0.0, 0.0]);
     for k in 0..3 {
-        matrix[k][k] = weight;
-        rhs[k] = -2.0 * fixed[2 + k];
+        matrix[k][k] = equations.a[2][2];
+        rhs[k] = -fixed[2 + k];
         matrix[k][3] = n0[k];
         matrix[k][4] = n1[k];
         matrix[3][k] = n0[k];
@@ -289,7 +311,7 @@ fn clamped(edge: &Edge, equations: &NormalEquations, x: Option<Unknowns>) -> Opt
     matrix[3][3] = -COINCIDENT;
     matrix[4][4] = -COINCIDENT;
     let s = solve(matrix, rhs)?;
-    edge.restore([l, m, s[0], s[1], s[2]]).filter(|x| edge.is_sound(x))
+    edge.restore([l, m, s[0], s[1], s[2]])
 }
 
 fn largest(c: &[f64; 2]) -> f64 {

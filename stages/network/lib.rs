@@ -28,7 +28,7 @@ pub struct NetworkStage {
 
 impl Stage for NetworkStage {
     const NAME: &'static str = "network";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
     type Params = NetworkParams;
     type Whole<'a> = (BaseMeshView<'a>,);
     type Rows<'a> = (CurvatureView<'a>,);
