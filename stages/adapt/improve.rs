@@ -33,7 +33,7 @@ pub(crate) fn improve(
     let gate = Gate::new(params);
     let mut best = surface.clone();
     let (mut cache, mut diagonals) = (ErrorCache::default(), ErrorCache::default());
-    let mut best_error = worst(&cache.edges(surface));
+    let mut best_score = Score::of(&cache.edges(surface));
     let mut failures = 0;
     let mut edits = Counters::default();
     for round in 0..params.improve_rounds {
@@ -51,9 +51,9 @@ pub(crate) fn improve(
         let split = split_round(surface, &gate, cache.edges(surface), room);
         edits.count("vertices_collapsed_for_error", collapsed);
         edits.count("edges_split_for_error", split);
-        let error = worst(&cache.edges(surface));
-        if error < best_error && surface.mesh.face_count() <= n_faces.max(best.mesh.face_count()) {
-            (best, best_error, failures) = (surface.clone(), error, 0);
+        let score = Score::of(&cache.edges(surface));
+        if score < best_score && surface.mesh.face_count() <= n_faces.max(best.mesh.face_count()) {
+            (best, best_score, failures) = (surface.clone(), score, 0);
             counters.merge(&std::mem::take(&mut edits));
         } else {
             failures += 1;
@@ -100,6 +100,20 @@ pub(crate) fn worst_curve_error_rel(surface: &SurfaceMesh<'_>) -> f64 {
 
 fn worst(errors: &[EdgeError]) -> f64 {
     errors.iter().map(|&(_, e)| e).fold(0.0, f64::max)
+}
+
+/// Errors of a mesh; meshes with the same worst edge are told apart by all others, so that one
+/// stubborn edge does not stop the rest from getting better.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+struct Score {
+    worst: f64,
+    sum_sq: f64,
+}
+
+impl Score {
+    fn of(errors: &[EdgeError]) -> Self {
+        Self { worst: worst(errors), sum_sq: errors.iter().map(|&(_, e)| e * e).sum() }
+    }
 }
 
 /// The error above which edges are split, and how many they are.
@@ -281,5 +295,7 @@ fn split_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge, middle: &V
     let Some(wings) = surface.wings(h) else { return false };
     let [c, d] = wings.map(|v| surface.at(v));
     let halves = [[a, middle, c], [middle, b, c], [b, middle, d], [middle, a, d]];
-    halves.iter().all(|face| gate.face_with_quality(face) < ROOM)
+    // An edge near the gate must stay open to the split that would mend it.
+    let before = gate.face(&[a, b, c]).max(gate.face(&[b, a, d]));
+    halves.iter().all(|face| gate.face_with_quality(face) < before.max(ROOM))
 }
