@@ -15,7 +15,7 @@ from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
 DEGREE = 7
 SAMPLES = 16
-STRIPES = 9
+STRIPES = 7
 
 
 def exponents(n):
@@ -69,7 +69,7 @@ def actor(points, triangles, normals=None, colours=None):
     data.SetPoints(at)
     cells = np.hstack([np.full((len(triangles), 1), 3), triangles]).astype(np.int64).ravel()
     polygons = vtk.vtkCellArray()
-    polygons.SetCells(len(triangles), numpy_to_vtkIdTypeArray(cells, deep=True))
+    polygons.ImportLegacyFormat(numpy_to_vtkIdTypeArray(cells, deep=True))
     data.SetPolys(polygons)
     if normals is not None:
         data.GetPointData().SetNormals(numpy_to_vtk(np.ascontiguousarray(normals), deep=True))
