@@ -10,6 +10,7 @@ use isospline_geometry::{Aabb, TriangleMesh};
 use isospline_implicit::{Field, InsideError, Oriented};
 use isospline_pipeline::{
     Event, Given, Graph, ModelKey, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
+    Threads,
 };
 use std::collections::BTreeMap;
 use std::fmt;
@@ -173,7 +174,8 @@ impl Conversion<'_> {
             params: limits,
             repairs: self.repairs(),
         };
-        Ok(isospline_check::check(&job, &isospline_check::on_this_thread))
+        let threads = Threads::new(RunOptions::default().threads);
+        Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
     }
 
     /// Counters of every fallback that a stage took, as `stage.name`.

@@ -4,10 +4,10 @@ use crate::config::ModelFile;
 use crate::{Model, ModelError, stages};
 use isospline_artifact::kinds::{Mesh, Patches, Topology, TopologyProof};
 use isospline_artifact::{Artifact, Container, Durability, FolderStore, Store, StoreError};
-use isospline_check::{CheckReport, Expected, Job, Surface, SurfaceError, on_this_thread};
+use isospline_check::{CheckReport, Expected, Job, Surface, SurfaceError};
 use isospline_pipeline::{
     Event, Graph, ModelKey, NodeStatus, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
-    read_provenance,
+    Threads, read_provenance,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -112,11 +112,11 @@ impl ModelFolder {
         self.store().open(&self.registry.artifact_name(node))
     }
 
-    /// Measures the finished surface.
+    /// Measures the finished surface on as many threads.
     ///
     /// # Errors
     /// [`FolderError::Store`], [`FolderError::Surface`].
-    pub fn check(&self) -> Result<CheckReport, FolderError> {
+    pub fn check(&self, threads: usize) -> Result<CheckReport, FolderError> {
         let container = self.patches()?;
         let surface = Surface::from_patches(&container.view::<Patches>()?)?;
         let job = Job {
@@ -126,7 +126,8 @@ impl ModelFolder {
             params: &self.model.file.check,
             repairs: self.repairs()?,
         };
-        Ok(isospline_check::check(&job, &on_this_thread))
+        let threads = Threads::new(threads);
+        Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
     }
 
     /// Counters of every fallback that a stage took, as `stage.name`.

@@ -4,7 +4,7 @@ use crate::clock;
 use crate::execute::{Execution, execute};
 use crate::finisher::Finisher;
 use crate::freshness::{Resolved, Source, assess, resolve};
-use crate::host::{Listener, Pool};
+use crate::host::{Listener, Threads};
 use crate::workers::Crew;
 use crate::{
     Event, Graph, ModelKey, NodeReport, NodeStatus, Outcome, Reason, Registry, RunError,
@@ -61,7 +61,7 @@ impl<'a> Pipeline<'a> {
         let wanted = Wanted::of(self, options)?;
         let _lock = self.store.lock()?;
         let threads = options.threads.max(1);
-        let pool = Pool::new(threads);
+        let pool = Threads::new(threads);
         let frame = Frame { pipeline: *self, nodes, scene, options: *options, events, pool };
         let reports = std::thread::scope(|scope| {
             let mut run = Run::new(&frame, scope, wanted);
@@ -112,7 +112,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) scene: Scene<'a>,
     pub(crate) options: RunOptions<'a>,
     pub(crate) events: Listener<'a>,
-    pub(crate) pool: Pool,
+    pub(crate) pool: Threads,
 }
 
 impl Frame<'_> {

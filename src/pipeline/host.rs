@@ -9,15 +9,25 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Listener to events.
 pub(crate) type Listener<'a> = &'a (dyn Fn(&Event) + Sync);
 
-/// Threads for `for_each`, started when first used.
-pub(crate) struct Pool {
+/// Threads to lend, started when first used.
+#[derive(Debug)]
+pub struct Threads {
     threads: usize,
     pool: OnceLock<Option<rayon::ThreadPool>>,
 }
 
-impl Pool {
-    pub(crate) fn new(threads: usize) -> Self {
+impl Threads {
+    /// As many threads; one means the caller's.
+    pub fn new(threads: usize) -> Self {
         Self { threads, pool: OnceLock::new() }
+    }
+
+    /// Runs `body(0) .. body(n - 1)`, in any order and on any of the threads.
+    pub fn for_each(&self, n: usize, body: &(dyn Fn(usize) + Sync)) {
+        match self.get() {
+            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().for_each(body)),
+            _ => (0..n).for_each(body),
+        }
     }
 
     /// `None` where one thread does, or where the system gives no more: the caller's thread then
@@ -33,17 +43,14 @@ impl Pool {
 pub(crate) struct StageHost<'a> {
     pub(crate) node: usize,
     pub(crate) label: &'a str,
-    pub(crate) pool: &'a Pool,
+    pub(crate) pool: &'a Threads,
     pub(crate) stop: &'a AtomicBool,
     pub(crate) events: Listener<'a>,
 }
 
 impl Host for StageHost<'_> {
     fn for_each(&self, n: usize, body: &(dyn Fn(usize) + Sync)) {
-        match self.pool.get() {
-            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().for_each(body)),
-            _ => (0..n).for_each(body),
-        }
+        self.pool.for_each(n, body);
     }
 
     fn progress(&self, done: u64, of: u64) -> Result<(), Stopped> {

@@ -31,6 +31,7 @@ pub use error::{GraphError, ParamsError, RunError, StageFailure};
 pub use event::Event;
 pub use freshness::{NodeStatus, State};
 pub use graph::{Given, Graph, ModelKey, Node};
+pub use host::Threads;
 pub use keys::Reason;
 pub use options::{RunOptions, Scene};
 pub use provenance::{Provenance, read_provenance};

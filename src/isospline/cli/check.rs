@@ -6,9 +6,9 @@ use crate::cli::output::{note, say};
 use crate::cli::tables;
 use isospline::config::ModelFile;
 use isospline::{Model, ModelFolder};
-use isospline_check::{CheckReport, Expected, Job, Surface, on_this_thread};
+use isospline_check::{CheckReport, Expected, Job, Surface};
 use isospline_export::NpzError;
-use isospline_pipeline::State;
+use isospline_pipeline::{RunOptions, State, Threads};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -37,7 +37,7 @@ fn check_folder(path: &Path) -> Result<(CheckReport, ModelFile), Failure> {
     if let Some(last) = status.last().filter(|last| matches!(last.state, State::Stale(_))) {
         note(&format!("warning: {last}; the figures are those of the surface as it was made"));
     }
-    let report = folder.check()?;
+    let report = folder.check(RunOptions::default().threads)?;
     Ok((report, folder.model().file.clone()))
 }
 
@@ -58,5 +58,7 @@ fn check_export(path: &Path, model: &Path) -> Result<(CheckReport, ModelFile), F
         params: &model.file.check,
         repairs: BTreeMap::new(),
     };
-    Ok((isospline_check::check(&job, &on_this_thread), model.file))
+    let threads = Threads::new(RunOptions::default().threads);
+    let report = isospline_check::check(&job, &|n, body| threads.for_each(n, body));
+    Ok((report, model.file))
 }

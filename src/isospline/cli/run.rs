@@ -23,7 +23,7 @@ pub(crate) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<u8, Failure> {
     {
         return Ok(code);
     }
-    let check = folder.check()?;
+    let check = folder.check(options.threads)?;
     let report = ConversionReport::new(&folder, &report, options.threads, check)?;
     let bytes = serde_json::to_vec_pretty(&report).expect("invariant: a report is plain data");
     folder.write_note(REPORT_NOTE, &bytes)?;
