@@ -30,6 +30,7 @@ use crate::dag::{Dag, Node, NodeId};
 use crate::evaluator;
 use crate::formula_error::FormulaError;
 use crate::interval_evaluator::enclose;
+use crate::interval_lanes::enclose_all;
 use crate::lowering::{self, Target};
 use crate::tape::Tape;
 use crate::{Field, Interval, IntervalJet, Jet1, Jet2};
@@ -158,5 +159,16 @@ impl Field for Formula {
     fn gradient_enclosure(&self, domain: [Interval; 3]) -> Option<IntervalJet> {
         let [value, x, y, z] = enclose(self.gradient_interval_tape(), domain);
         Some(IntervalJet { value, gradient: [x, y, z] })
+    }
+
+    fn value_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<Interval>]) {
+        enclose_all::<1, _>(&self.value_intervals, domains, out, |[value]| Some(value));
+    }
+
+    fn gradient_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalJet>]) {
+        let tape = self.gradient_interval_tape();
+        enclose_all::<4, _>(tape, domains, out, |[value, x, y, z]| {
+            Some(IntervalJet { value, gradient: [x, y, z] })
+        });
     }
 }

@@ -199,47 +199,72 @@ impl Div for Interval {
     }
 }
 
+/// A lower bound of what rounds to `value`: the float before it, or a little less if it is near
+/// the smallest normal number; the largest float for a positive overflow.
+///
+/// With u = 2^-53 the step `u (1 + 2 u) |value|` exceeds half the distance to the next float and
+/// stays below it, so the rounded difference is that float \[derived\]. Arithmetic where
+/// `next_down` works on bits with five cases: it becomes vector code.
+#[inline]
+pub(crate) fn down(value: f64) -> f64 {
+    const STEP: f64 = (1.0 + f64::EPSILON) * (0.5 * f64::EPSILON);
+    let lower = value - (STEP * value.abs() + f64::MIN_POSITIVE);
+    if value == f64::INFINITY { f64::MAX } else { lower }
+}
+
 /// A lower bound of `a + b`, the sum itself if it is exact (by the error term of two-sum).
 #[inline]
-fn add_down(a: f64, b: f64) -> f64 {
+pub(crate) fn add_down(a: f64, b: f64) -> f64 {
     let sum = a + b;
     let b_part = sum - a;
     let error = (a - (sum - b_part)) + (b - b_part);
-    if error >= 0.0 {
-        return sum;
-    }
     // Infinite sums have a NaN error: exact if a term is infinite, else an overflow.
-    if error.is_nan() && (a.is_infinite() || b.is_infinite()) { sum } else { sum.next_down() }
+    let is_exact = (error >= 0.0) | is_infinite(a) | is_infinite(b);
+    let lower = down(sum);
+    if is_exact { sum } else { lower }
 }
 
 /// A lower bound of `a * b`, the product itself if it is exact.
 #[inline]
+#[expect(clippy::needless_bitwise_bool, reason = "lazy operators would be branches")]
 pub(crate) fn mul_down(a: f64, b: f64) -> f64 {
-    if a == 0.0 || b == 0.0 {
-        return 0.0;
-    }
     let product = a * b;
-    if is_exact(a, b, product) {
-        return product;
-    }
+    let lower = down(product);
+    let bound = if is_exact(a, b, product) { product } else { lower };
     // An underflow to zero hides the sign: a product of equal signs is not below zero.
-    if product == 0.0 && (a > 0.0) == (b > 0.0) { 0.0 } else { product.next_down() }
+    let is_tiny = (product == 0.0) & ((a > 0.0) == (b > 0.0));
+    if (a == 0.0) | (b == 0.0) | is_tiny { 0.0 } else { bound }
+}
+
+/// An upper bound of `a * b`, likewise.
+#[inline]
+pub(crate) fn mul_up(a: f64, b: f64) -> f64 {
+    -mul_down(-a, b)
 }
 
 #[inline]
-fn mul_up(a: f64, b: f64) -> f64 {
-    -mul_down(-a, b)
+fn is_infinite(a: f64) -> bool {
+    a.abs() == f64::INFINITY
 }
 
 /// Whether `a * b` is not rounded: its factors have few enough significant bits together.
 #[inline]
 fn is_exact(a: f64, b: f64, product: f64) -> bool {
+    let size = product.abs();
+    let is_normal = (f64::MIN_POSITIVE..=f64::MAX).contains(&size);
+    let is_short = lowest_bit(a) * lowest_bit(b) >= 9_007_199_254_740_992.0;
+    (is_short & is_normal) | is_infinite(a) | is_infinite(b)
+}
+
+/// The lowest bit set in the significand, 1 to 2^52. Without counting or converting, for which
+/// there are no vector instructions: the bit is added to those of the float 2^52.
+#[inline]
+fn lowest_bit(a: f64) -> f64 {
     const HIDDEN: u64 = 1 << 52;
-    let spare = |v: f64| (v.to_bits() | HIDDEN).trailing_zeros();
-    if a.is_infinite() || b.is_infinite() {
-        return true;
-    }
-    spare(a) + spare(b) >= 53 && product.is_normal()
+    const TWO_52: f64 = 4_503_599_627_370_496.0;
+    let bits = a.to_bits() | HIDDEN;
+    let lowest = bits & bits.wrapping_neg();
+    f64::from_bits(TWO_52.to_bits() + lowest) - TWO_52
 }
 
 /// A lower bound of `a / b` for `b > 0`.
@@ -254,30 +279,32 @@ fn div_down(a: f64, b: f64) -> f64 {
     if exact || a.is_infinite() {
         return quotient;
     }
-    if quotient == 0.0 && a > 0.0 { 0.0 } else { quotient.next_down() }
+    if quotient == 0.0 && a > 0.0 { 0.0 } else { down(quotient) }
 }
 
-/// `a^n` from below for `a >= 0`, with the multiplications of [`crate::operation::power`].
+/// `a^n` from below for `a >= 0` and `n >= 1`, with the multiplications of
+/// [`crate::operation::power`].
+#[inline]
 fn power_down(a: f64, n: u32) -> f64 {
-    match n {
-        1 => a,
-        _ if n.is_multiple_of(2) => {
-            let root = power_down(a, n / 2);
-            mul_down(root, root)
-        }
-        _ => mul_down(power_down(a, n - 1), a),
-    }
+    power_by(a, n, mul_down)
 }
 
+/// `a^n` from above, likewise.
+#[inline]
 fn power_up(a: f64, n: u32) -> f64 {
-    match n {
-        1 => a,
-        _ if n.is_multiple_of(2) => {
-            let root = power_up(a, n / 2);
-            mul_up(root, root)
+    power_by(a, n, mul_up)
+}
+
+#[inline]
+fn power_by(a: f64, n: u32, multiply: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut power = a;
+    for bit in (0..n.ilog2()).rev() {
+        power = multiply(power, power);
+        if n >> bit & 1 == 1 {
+            power = multiply(power, a);
         }
-        _ => mul_up(power_up(a, n - 1), a),
     }
+    power
 }
 
 #[cfg(test)]
@@ -307,6 +334,23 @@ mod tests {
         let large = Interval::point(1e200);
         assert_eq!(large * large, Interval::new(f64::MAX, f64::INFINITY));
         assert_eq!((Interval::point(f64::MAX) + Interval::point(f64::MAX)).lo, f64::MAX);
+    }
+
+    #[test]
+    fn stepping_down_by_arithmetic_gives_the_float_before() {
+        let mut bits = 0x9e37_79b9_7f4a_7c15_u64;
+        for _ in 0..100_000 {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let some = f64::from_bits(bits);
+            let power = f64::from_bits(bits & 0xfff0_0000_0000_0000);
+            for value in [some, power, power.next_down(), power.next_up()] {
+                if value.abs() > 1e-290 && value.is_finite() {
+                    assert_eq!(down(value), value.next_down(), "{value:e}");
+                } else if !value.is_nan() {
+                    assert!(down(value) < value || value == f64::NEG_INFINITY, "{value:e}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -19,15 +19,15 @@ pub(crate) fn enclose<const K: usize>(tape: &Tape, domain: [Interval; 3]) -> [In
         file[register as usize] = domain[axis as usize];
     }
     for instruction in &tape.instructions {
-        file[instruction.out as usize] = step(instruction, &file);
+        file[instruction.out as usize] = step(instruction, |k| file[instruction.args[k] as usize]);
     }
     let outputs = std::array::from_fn(|k| file[tape.outputs[k] as usize]);
     SCRATCH.set(file);
     outputs
 }
 
-fn step(instruction: &Instruction, file: &[Interval]) -> Interval {
-    let argument = |k: usize| file[instruction.args[k] as usize];
+/// The result of one instruction from its arguments.
+pub(crate) fn step(instruction: &Instruction, argument: impl Fn(usize) -> Interval) -> Interval {
     match instruction.op {
         Op::Constant => Interval::point(instruction.constant),
         Op::Unary(op) => argument(0).unary(op),

@@ -19,6 +19,7 @@ pub mod inside;
 pub mod interval;
 mod interval_evaluator;
 mod interval_functions;
+mod interval_lanes;
 mod lexer;
 mod lowering;
 mod operation;

@@ -22,30 +22,223 @@ const MOST_HALVINGS: u32 = 15;
 /// Tetrahedra that turn from the gradient so far that their cosine is below this, at points of
 /// their own piece, are refined without asking for a proof: it would take many boxes.
 const HOPELESS_COSINE: f64 = 0.25;
+/// Boxes that are looked at together at least, if there are as many: what the field encloses at
+/// a time.
+const LEAST_BATCH: usize = 16;
 
-/// The tetrahedra, of those given, that fail the test; all lie in the box `cube`.
-pub(crate) fn failing(
-    field: &dyn Field,
-    complex: &Complex,
-    tetrahedra: &[Tetrahedron],
-    cube: [Interval; 3],
-) -> Vec<Tetrahedron> {
-    // One word holds the set of open tetrahedra; a cube has 24 of one kind at most.
-    tetrahedra.chunks(64).flat_map(|some| failing_of_few(field, complex, some, cube)).collect()
+/// A cube and tetrahedra in it.
+#[derive(Clone, Debug)]
+pub(crate) struct Cube {
+    /// It.
+    pub(crate) domain: [Interval; 3],
+    /// All lie in the cube.
+    pub(crate) tetrahedra: Vec<Tetrahedron>,
 }
 
-fn failing_of_few(
-    field: &dyn Field,
-    complex: &Complex,
-    tetrahedra: &[Tetrahedron],
-    cube: [Interval; 3],
-) -> Vec<Tetrahedron> {
-    let interpolants: Vec<_> = tetrahedra.iter().map(|t| Interpolant::of(complex, t)).collect();
-    let mut failed = hopeless(field, &interpolants);
-    let open = set(0..interpolants.len()) & !failed;
-    let mut test = Test { field, interpolants: &interpolants, boxes: MOST_BOXES, gains: [0.0; 3] };
-    failed |= test.failing_on(cube, open, [0; 3]);
-    members(failed).map(|i| tetrahedra[i]).collect()
+/// The tetrahedra, of those given, that fail the test, in their order.
+///
+/// Every cube is searched depth first, for one failing box settles a tetrahedron; but in all cubes
+/// at the same time, because fields enclose many boxes much faster than one by one.
+pub(crate) fn failing(field: &dyn Field, complex: &Complex, cubes: &[Cube]) -> Vec<Tetrahedron> {
+    // One word holds the set of open tetrahedra; a cube has 24 of one kind at most.
+    let shares = cubes.iter().flat_map(|cube| cube.tetrahedra.chunks(64).map(move |t| (cube, t)));
+    let mut tests: Vec<Test<'_>> = shares
+        .map(|(cube, tetrahedra)| Test::new(field, complex, cube.domain, tetrahedra))
+        .collect();
+    loop {
+        let batch = next_batch(&mut tests);
+        if batch.is_empty() {
+            break;
+        }
+        look(field, &mut tests, batch);
+    }
+    let failed_of = |test: &Test<'_>| {
+        let tetrahedra = test.tetrahedra.to_vec();
+        members(test.failed).map(move |i| tetrahedra[i])
+    };
+    tests.iter().flat_map(failed_of).collect()
+}
+
+/// The test of some tetrahedra of one cube.
+struct Test<'a> {
+    tetrahedra: &'a [Tetrahedron],
+    interpolants: Vec<Interpolant>,
+    /// Those found to fail.
+    failed: u64,
+    /// Boxes to look at, the next one last.
+    parts: Vec<Part>,
+    /// Boxes left.
+    boxes: u32,
+    /// What halving the whole cube along each axis takes from the width of the enclosure.
+    gains: [f64; 3],
+}
+
+/// A box in a cube.
+#[derive(Clone, Copy)]
+struct Part {
+    domain: [Interval; 3],
+    middle: Vec3,
+    /// Half its size; covers the rounding of the middle.
+    radius: Vec3,
+    /// The tetrahedra that have not passed on all of the box.
+    open: u64,
+    /// How often the cube was halved along each axis.
+    halvings: [u32; 3],
+}
+
+/// A part with its test.
+type Entry = (usize, Part);
+
+/// The next boxes of all tests: one of each, or some if few tests are left.
+fn next_batch(tests: &mut [Test<'_>]) -> Vec<Entry> {
+    let active = tests.iter().filter(|test| !test.parts.is_empty()).count();
+    let each = LEAST_BATCH.div_ceil(active.max(1));
+    let mut batch = Vec::with_capacity(active * each);
+    for (i, test) in tests.iter_mut().enumerate() {
+        let rest = test.parts.len().saturating_sub(each);
+        batch.extend(test.parts.drain(rest..).rev().map(|part| (i, part)));
+    }
+    batch
+}
+
+/// Looks at boxes; what fails is halved and put back.
+fn look(field: &dyn Field, tests: &mut [Test<'_>], mut batch: Vec<Entry>) {
+    batch.retain_mut(|(i, part)| tests[*i].admits(part));
+    let mut jets = vec![None; batch.len()];
+    let domains: Vec<_> = batch.iter().map(|(_, part)| part.domain).collect();
+    field.gradient_enclosures(&domains, &mut jets);
+    let mut open: Vec<(Entry, IntervalJet)> = Vec::new();
+    for ((i, mut part), jet) in batch.into_iter().zip(jets) {
+        let Some(jet) = jet else {
+            tests[i].failed |= part.open;
+            continue;
+        };
+        part.keep(&tests[i], |l, part| {
+            !l.is_transversal(&jet.gradient) && !l.has_sign_of(jet.value, part.middle, part.radius)
+        });
+        if part.open != 0 {
+            open.push(((i, part), jet));
+        }
+    }
+    look_closer(field, tests, &mut open);
+    measure_gains(field, tests, &open);
+    for ((i, part), _) in open.iter().rev() {
+        tests[*i].halve(part);
+    }
+}
+
+/// Passes those whose sign the mean value form tells.
+fn look_closer(field: &dyn Field, tests: &[Test<'_>], open: &mut Vec<(Entry, IntervalJet)>) {
+    // Near the surface the interpolants change sign themselves: no form of f would help.
+    let may_help = |&((i, part), _): &(Entry, IntervalJet)| {
+        members(part.open).any(|l| tests[i].interpolants[l].has_sign(part.middle, part.radius))
+    };
+    let places: Vec<usize> = (0..open.len()).filter(|&k| may_help(&open[k])).collect();
+    let middle = |&k: &usize| [0, 1, 2].map(|axis| Interval::point(open[k].0.1.middle[axis]));
+    let middles: Vec<_> = places.iter().map(middle).collect();
+    let mut values = vec![None; middles.len()];
+    field.value_enclosures(&middles, &mut values);
+    for (k, value) in places.into_iter().zip(values) {
+        let ((i, part), jet) = &mut open[k];
+        let value = value.map_or(jet.value, |at_middle| mean_value_form(at_middle, jet, part));
+        part.keep(&tests[*i], |l, part| !l.has_sign_of(value, part.middle, part.radius));
+    }
+    open.retain(|((_, part), _)| part.open != 0);
+}
+
+/// `f(m) + grad f . (x - m)`: its excess shrinks with the square of the box.
+fn mean_value_form(at_middle: Interval, jet: &IntervalJet, part: &Part) -> Interval {
+    let spread = spread(&jet.gradient, &part.radius) * (1.0 + 1e-12);
+    let form =
+        Interval::new((at_middle.lo - spread).next_down(), (at_middle.hi + spread).next_up());
+    if form.lo.is_finite() && form.hi.is_finite() { form } else { jet.value }
+}
+
+/// Of whole cubes: how much narrower `grad L . grad f` gets where an axis shrinks to its middle.
+fn measure_gains(field: &dyn Field, tests: &mut [Test<'_>], open: &[(Entry, IntervalJet)]) {
+    let whole: Vec<_> = open.iter().filter(|((_, part), _)| part.halvings == [0; 3]).collect();
+    let thin = |((_, part), _): &&(Entry, IntervalJet)| {
+        [0, 1, 2].map(|axis| {
+            let mut thin = part.domain;
+            thin[axis] = Interval::point(part.middle[axis]);
+            thin
+        })
+    };
+    let domains: Vec<_> = whole.iter().flat_map(thin).collect();
+    let mut jets = vec![None; domains.len()];
+    field.gradient_enclosures(&domains, &mut jets);
+    for (((i, part), jet), thin) in whole.into_iter().zip(jets.as_chunks::<3>().0) {
+        let test = &mut tests[*i];
+        let weights: Vec3 = members(part.open).map(|l| test.interpolants[l].gradient.abs()).sum();
+        let width =
+            |jet: &IntervalJet| (0..3).map(|k| weights[k] * jet.gradient[k].width()).sum::<f64>();
+        let widest = width(jet);
+        test.gains = thin.map(|jet| {
+            let gain = jet.map_or(0.0, |jet| widest - width(&jet));
+            // Where slopes are unbounded all axes count alike; a thousandth keeps every axis in
+            // play, since the sign of f needs them too.
+            if gain.is_finite() { gain.max(1e-3 * widest) } else { 1.0 }
+        });
+    }
+}
+
+impl<'a> Test<'a> {
+    fn new(
+        field: &dyn Field,
+        complex: &Complex,
+        cube: [Interval; 3],
+        tetrahedra: &'a [Tetrahedron],
+    ) -> Self {
+        let interpolants: Vec<_> = tetrahedra.iter().map(|t| Interpolant::of(complex, t)).collect();
+        let failed = hopeless(field, &interpolants);
+        let open = set(0..interpolants.len()) & !failed;
+        let parts = vec![Part::new(cube, open, [0; 3])];
+        Self { tetrahedra, interpolants, failed, parts, boxes: MOST_BOXES, gains: [0.0; 3] }
+    }
+
+    /// Whether a box needs a look. If none is left, what is open there fails.
+    fn admits(&mut self, part: &mut Part) -> bool {
+        part.open &= !self.failed;
+        part.keep(self, |l, part| !l.is_beside(part.middle, part.radius));
+        if self.boxes == 0 {
+            self.failed |= part.open;
+        }
+        if part.open == 0 || self.boxes == 0 {
+            return false;
+        }
+        self.boxes -= 1;
+        true
+    }
+
+    /// Puts the halves of a box back, or takes it for failed.
+    fn halve(&mut self, part: &Part) {
+        if part.halvings.iter().sum::<u32>() >= MOST_HALVINGS {
+            self.failed |= part.open;
+            return;
+        }
+        let gain = |k: usize| self.gains[k] / (1_u64 << part.halvings[k]) as f64;
+        let axis = (0..3).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
+        let axis = axis.expect("invariant: three axes");
+        let mut deeper = part.halvings;
+        deeper[axis] += 1;
+        let (mut lower, mut upper) = (part.domain, part.domain);
+        lower[axis].hi = part.middle[axis];
+        upper[axis].lo = part.middle[axis];
+        self.parts.extend([upper, lower].map(|half| Part::new(half, part.open, deeper)));
+    }
+}
+
+impl Part {
+    fn new(domain: [Interval; 3], open: u64, halvings: [u32; 3]) -> Self {
+        let middle = domain.map(|i| f64::midpoint(i.lo, i.hi));
+        let radius = [0, 1, 2].map(|k| (domain[k].hi - middle[k]).max(middle[k] - domain[k].lo));
+        Self { domain, middle: middle.into(), radius: radius.into(), open, halvings }
+    }
+
+    /// Leaves those open that `is_open`.
+    fn keep(&mut self, test: &Test<'_>, is_open: impl Fn(&Interpolant, &Self) -> bool) {
+        self.open = set(members(self.open).filter(|&l| is_open(&test.interpolants[l], self)));
+    }
 }
 
 /// Those whose own piece is seen to turn too far from the gradient.
@@ -68,101 +261,13 @@ fn set(members: impl IntoIterator<Item = usize>) -> u64 {
 }
 
 fn members(set: u64) -> impl Iterator<Item = usize> {
-    (0..64).filter(move |i| set >> i & 1 == 1)
-}
-
-/// The middle and half the size of a box; the half covers rounding of the middle.
-fn middle_and_radius(domain: &[Interval; 3]) -> (Vec3, Vec3) {
-    let middle = domain.map(|i| f64::midpoint(i.lo, i.hi));
-    let radius = [0, 1, 2].map(|k| (domain[k].hi - middle[k]).max(middle[k] - domain[k].lo));
-    (middle.into(), radius.into())
-}
-
-struct Test<'a> {
-    field: &'a dyn Field,
-    interpolants: &'a [Interpolant],
-    /// Boxes left.
-    boxes: u32,
-    /// What halving the whole cube along each axis takes from the width of the enclosure.
-    gains: [f64; 3],
-}
-
-impl Test<'_> {
-    /// The members of the set `open` that fail on a box made by so many halvings along each axis.
-    fn failing_on(&mut self, domain: [Interval; 3], open: u64, halvings: [u32; 3]) -> u64 {
-        let (middle, radius) = middle_and_radius(&domain);
-        let pick = |open: u64, keep: &dyn Fn(&Interpolant) -> bool| {
-            set(members(open).filter(|&i| keep(&self.interpolants[i])))
-        };
-        let open = pick(open, &|i| !i.is_beside(middle, radius));
-        if open == 0 || self.boxes == 0 {
-            return open;
-        }
-        self.boxes -= 1;
-        let Some(jet) = self.field.gradient_enclosure(domain) else { return open };
-        let open = pick(open, &|i| {
-            !i.is_transversal(&jet.gradient) && !i.has_sign_of(jet.value, middle, radius)
-        });
-        if open == 0 {
-            return 0;
-        }
-        let mut open = open;
-        // Near the surface the interpolants change sign themselves: no form of f would help.
-        if members(open).any(|i| self.interpolants[i].has_sign(middle, radius)) {
-            let value = self.mean_value_form(&jet, middle, radius);
-            open = pick(open, &|i| !i.has_sign_of(value, middle, radius));
-        }
-        if open == 0 || halvings.iter().sum::<u32>() >= MOST_HALVINGS {
-            return open;
-        }
-        if halvings == [0; 3] {
-            self.gains = self.gains_of(&domain, &jet, open);
-        }
-        self.failing_on_halves(domain, open, halvings)
-    }
-
-    fn failing_on_halves(&mut self, domain: [Interval; 3], open: u64, halvings: [u32; 3]) -> u64 {
-        let gain = |k: usize| self.gains[k] / (1_u64 << halvings[k]) as f64;
-        let axis = (0..3).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
-        let axis = axis.expect("invariant: three axes");
-        let mut deeper = halvings;
-        deeper[axis] += 1;
-        let middle = f64::midpoint(domain[axis].lo, domain[axis].hi);
-        let (mut lower, mut upper) = (domain, domain);
-        lower[axis].hi = middle;
-        upper[axis].lo = middle;
-        let failed = self.failing_on(lower, open, deeper);
-        // One failing box settles a tetrahedron: no need to look at its other boxes.
-        if open == failed { open } else { failed | self.failing_on(upper, open & !failed, deeper) }
-    }
-
-    /// `f(m) + grad f . (x - m)`: its excess shrinks with the square of the box.
-    fn mean_value_form(&self, jet: &IntervalJet, middle: Vec3, radius: Vec3) -> Interval {
-        let at_middle = [0, 1, 2].map(|k| Interval::new(middle[k], middle[k]));
-        let Some(f) = self.field.value_enclosure(at_middle) else { return jet.value };
-        let spread = spread(&jet.gradient, &radius) * (1.0 + 1e-12);
-        let form = Interval::new((f.lo - spread).next_down(), (f.hi + spread).next_up());
-        if form.lo.is_finite() && form.hi.is_finite() { form } else { jet.value }
-    }
-
-    /// How much narrower `grad L . grad f` gets where an axis shrinks to its middle.
-    fn gains_of(&self, domain: &[Interval; 3], jet: &IntervalJet, open: u64) -> [f64; 3] {
-        let weights = members(open).map(|i| self.interpolants[i].gradient.abs());
-        let weights: Vec3 = weights.sum();
-        let width = |jet: &IntervalJet| {
-            (0..3).map(|k| weights[k] * (jet.gradient[k].hi - jet.gradient[k].lo)).sum::<f64>()
-        };
-        let whole = width(jet);
-        [0, 1, 2].map(|axis| {
-            let mut thin = *domain;
-            let middle = f64::midpoint(thin[axis].lo, thin[axis].hi);
-            thin[axis] = Interval::new(middle, middle);
-            let gain = self.field.gradient_enclosure(thin).map_or(0.0, |jet| whole - width(&jet));
-            // Where slopes are unbounded all axes count alike; a thousandth keeps every axis in
-            // play, since the sign of f needs them too.
-            if gain.is_finite() { gain.max(1e-3 * whole) } else { 1.0 }
-        })
-    }
+    let mut rest = set;
+    std::iter::from_fn(move || {
+        let first = rest.trailing_zeros() as usize;
+        // Takes the lowest bit away.
+        rest &= rest.wrapping_sub(1);
+        (first < 64).then_some(first)
+    })
 }
 
 /// Largest value of `g . d` over `g` in an enclosure and `|d| <= radius` by components.

@@ -80,7 +80,7 @@ pub struct Polygonize {
 
 impl Stage for Polygonize {
     const NAME: &'static str = "polygonize";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
     type Params = PolygonizeParams;
     type Whole<'a> = ();
     type Rows<'a> = ();

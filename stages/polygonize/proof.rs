@@ -1,6 +1,6 @@
 //! Refining until the topology is proved, or until it is clear that it will not be.
 
-use crate::certificate::failing;
+use crate::certificate::{Cube, failing};
 use crate::complex::{Complex, Tetrahedron};
 use crate::grid::Site;
 use crate::params::PolygonizeParams;
@@ -59,13 +59,14 @@ pub(crate) fn no_singular_point(ctx: &Ctx<'_>, complex: &Complex) -> Result<(), 
 
 fn failing_cells(ctx: &Ctx<'_>, complex: &Complex) -> Vec<Tetrahedron> {
     let n_tasks = complex.n_cells().div_ceil(CELLS_A_TASK);
-    let of_cell = |cell: usize| {
-        let tetrahedra: Vec<_> = complex.tetrahedra(cell).collect();
-        failing(ctx.field, complex, &tetrahedra, complex.cell_box(cell))
+    let cube = |cell: usize| Cube {
+        domain: complex.cell_box(cell),
+        tetrahedra: complex.tetrahedra(cell).collect(),
     };
     map(ctx.host, n_tasks, |task| {
         let last = ((task + 1) * CELLS_A_TASK).min(complex.n_cells());
-        (task * CELLS_A_TASK..last).flat_map(of_cell).collect::<Vec<_>>()
+        let cubes: Vec<_> = (task * CELLS_A_TASK..last).map(cube).collect();
+        failing(ctx.field, complex, &cubes)
     })
     .concat()
 }
@@ -81,12 +82,18 @@ fn failing_tetrahedra(
     homes.sort_by_key(|&(cube, _)| cube);
     let cubes: Vec<_> = homes.chunk_by(|a, b| a.0 == b.0).collect();
     let shares: Vec<_> = cubes.chunks(CELLS_A_TASK).collect();
-    let of_cube = |members: &&[((Site, u32), Tetrahedron)]| {
+    let cube = |members: &&[((Site, u32), Tetrahedron)]| {
         let (lo, width) = members[0].0;
-        let tetrahedra: Vec<_> = members.iter().map(|m| m.1).collect();
-        failing(ctx.field, complex, &tetrahedra, complex.grid.intervals(lo, lo.map(|c| c + width)))
+        Cube {
+            domain: complex.grid.intervals(lo, lo.map(|c| c + width)),
+            tetrahedra: members.iter().map(|m| m.1).collect(),
+        }
     };
-    map(ctx.host, shares.len(), |i| shares[i].iter().flat_map(of_cube).collect::<Vec<_>>()).concat()
+    map(ctx.host, shares.len(), |i| {
+        let cubes: Vec<_> = shares[i].iter().map(cube).collect();
+        failing(ctx.field, complex, &cubes)
+    })
+    .concat()
 }
 
 /// The cube of the bisection tree that a tetrahedron lies in: its lower corner and width.

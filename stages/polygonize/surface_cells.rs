@@ -7,11 +7,14 @@
 use crate::PolygonizeError;
 use crate::bulk;
 use crate::grid::{Grid, Site};
+use isospline_implicit::Interval;
 use isospline_stage::{Ctx, map};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Boxes handed out to threads; more would not balance better.
 const SHARES: usize = 64;
+/// Blocks that are halved before the halves are looked at: bounds the memory of those in vain.
+const BLOCKS_AT_ONCE: usize = 1024;
 /// Cells along the longest side up to which a field without intervals is sampled everywhere.
 pub(crate) const MOST_DENSE_CELLS: u32 = 256;
 
@@ -37,19 +40,15 @@ pub(crate) fn surface_cells(
     }
     let mut blocks = vec![whole];
     while blocks.len() < SHARES && blocks.iter().any(|b| !b.is_cell()) {
-        blocks = blocks
-            .iter()
-            .filter(|b| b.may_hold_surface(ctx, grid))
-            .flat_map(|b| if b.is_cell() { vec![*b] } else { b.children() })
-            .collect();
+        blocks = halved(&holding_surface(ctx, grid, blocks));
     }
     let found = AtomicUsize::new(0);
     let parts = map(ctx.host, blocks.len(), |i| {
-        let mut cells = Vec::new();
-        descend(ctx, grid, blocks[i], &mut |cell| {
-            cells.push(cell);
-            found.fetch_add(1, Ordering::Relaxed) < limit as usize
-        });
+        if found.load(Ordering::Relaxed) > limit as usize {
+            return Vec::new();
+        }
+        let cells = cells_of(ctx, grid, blocks[i], limit as usize);
+        found.fetch_add(cells.len(), Ordering::Relaxed);
         cells
     });
     if found.into_inner() > limit as usize {
@@ -69,26 +68,45 @@ fn too_many(grid: &Grid, limit: u32) -> PolygonizeError {
     PolygonizeError::TooManyCells { cells: u64::from(grid.longest()), limit }
 }
 
-/// Visits the cells of a block that may hold surface until `visit` says no; false if it did.
-fn descend(ctx: &Ctx<'_>, grid: &Grid, block: Block, visit: &mut impl FnMut(Site) -> bool) -> bool {
-    if !block.may_hold_surface(ctx, grid) {
-        return true;
+/// The cells of a block that may hold surface, in the order of the tree; more than `limit` of any
+/// kind if a level of the tree has more. Level by level: the field encloses many boxes faster than
+/// one by one.
+fn cells_of(ctx: &Ctx<'_>, grid: &Grid, block: Block, limit: usize) -> Vec<Site> {
+    let mut blocks = holding_surface(ctx, grid, vec![block]);
+    while blocks.len() <= limit && !blocks.iter().all(Block::is_cell) {
+        let mut finer = Vec::new();
+        for some in blocks.chunks(BLOCKS_AT_ONCE) {
+            finer.extend(holding_surface(ctx, grid, halved(some)));
+            if finer.len() > limit {
+                break;
+            }
+        }
+        blocks = finer;
     }
-    if block.is_cell() {
-        return visit(block.lo);
-    }
-    block.children().into_iter().all(|child| descend(ctx, grid, child, visit))
+    blocks.iter().map(|cell| cell.lo).collect()
+}
+
+fn halved(blocks: &[Block]) -> Vec<Block> {
+    blocks.iter().flat_map(Block::children).collect()
+}
+
+/// Those where the enclosure of f does not exclude zero.
+fn holding_surface(ctx: &Ctx<'_>, grid: &Grid, mut blocks: Vec<Block>) -> Vec<Block> {
+    let site = |at: Site| at.map(|c| c << grid.levels);
+    let domains: Vec<_> = blocks.iter().map(|b| grid.intervals(site(b.lo), site(b.hi))).collect();
+    let mut values = vec![None; blocks.len()];
+    ctx.field.value_enclosures(&domains, &mut values);
+    let mut values = values.iter();
+    blocks.retain(|_| {
+        let value = values.next().expect("invariant: a value each block");
+        value.is_none_or(|f: Interval| f.may_be_zero())
+    });
+    blocks
 }
 
 impl Block {
     fn is_cell(&self) -> bool {
         (0..3).all(|k| self.hi[k] - self.lo[k] == 1)
-    }
-
-    fn may_hold_surface(&self, ctx: &Ctx<'_>, grid: &Grid) -> bool {
-        let domain =
-            grid.intervals(self.lo.map(|c| c << grid.levels), self.hi.map(|c| c << grid.levels));
-        ctx.field.value_enclosure(domain).is_none_or(|f| f.may_be_zero())
     }
 
     /// The block halved along every axis that has more than one cell.

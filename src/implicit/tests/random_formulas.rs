@@ -156,6 +156,11 @@ proptest! {
         let IntervalJet { value, gradient } = field.gradient_enclosure(domain).unwrap();
         let tight = field.tight_value_enclosure(domain).unwrap();
         prop_assert_eq!(field.value_enclosure(domain).map(|v| v.lo.to_bits()), Some(value.lo.to_bits()));
+        let mut together = [None; 5];
+        field.gradient_enclosures(&[domain; 5], &mut together);
+        let alone = field.gradient_enclosure(domain);
+        // As text, for NaN is not equal to itself.
+        prop_assert_eq!(format!("{:?}", together), format!("{:?}", [alone; 5]));
         for share in shares {
             let point = Vec3::from_fn(|k, _| {
                 (domain[k].lo + share[k] * domain[k].width()).clamp(domain[k].lo, domain[k].hi)
