@@ -72,9 +72,11 @@ impl Diagnosis for AdaptError {
 
     fn help(&self) -> Option<String> {
         match self {
-            Self::Unfit { .. } => {
-                Some("raise target.faces, or smooth the formula at this place".to_owned())
-            }
+            Self::Unfit { .. } => Some(
+                "if the surface has a sharp edge there (min, max, abs), round it off with smin or \
+                 smax; if not, raise target.faces"
+                    .to_owned(),
+            ),
             _ => None,
         }
     }

@@ -14,6 +14,11 @@ const GAIN: f64 = 0.95;
 const SOFT: f64 = 0.9;
 /// Least part of an edge that a split leaves on either side.
 const SHORTEST_HALF: f64 = 0.1;
+/// Splits may grow the mesh to this many times its faces: a sharp edge is not rounded by any number
+/// of faces, and what a smooth surface needs beyond this it should get from `target.faces`.
+const GROWTH: usize = 4;
+/// Faces that a small mesh may grow to in any case.
+const GROWTH_FLOOR: usize = 4000;
 /// Rounds of the soft repair: what two passes of flips and slides do not mend, they never do.
 const SOFT_ROUNDS: u32 = 3;
 
@@ -28,10 +33,14 @@ pub(crate) fn make_fit(
     counters: &mut Counters,
 ) -> Result<(), AdaptError> {
     let gate = Gate::new(params);
+    let most_faces = (GROWTH * surface.mesh.face_count()).max(GROWTH_FLOOR);
     for round in 0..params.max_rounds {
         let unfit = faces_above(surface, |s, f| gate.face(&s.corners(f)), 1.0);
         if unfit.is_empty() {
             return Ok(());
+        }
+        if surface.mesh.face_count() > most_faces {
+            break;
         }
         if round == 0 {
             counters.count("unfit_faces_in", unfit.len() as u64);
