@@ -19,7 +19,7 @@ pub enum AdaptError {
         unfit_faces: u32,
         /// Middle of the worst edge.
         place: Vec3,
-        /// Angle between the normals at its ends [deg].
+        /// Angle between the normals at its ends, degrees.
         turning_deg: f64,
         /// Part of its chord along a normal.
         slope: f64,

@@ -51,7 +51,7 @@ impl Gate {
     }
 }
 
-/// Angle between the normals of two vertices [deg].
+/// Angle between the normals of two vertices, degrees.
 pub(crate) fn turning_deg(p: &Vertex, q: &Vertex) -> f64 {
     let (sin, cos) = (p.normal.cross(&q.normal).norm(), p.normal.dot(&q.normal));
     libm::atan2(sin, cos).to_degrees()

@@ -17,7 +17,7 @@ pub enum Improve {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AdaptParams {
-    /// Largest angle between the normals at the ends of an edge [deg], 5 to 120.
+    /// Largest angle between the normals at the ends of an edge, 5 to 120 degrees.
     pub max_turning_deg: f64,
     /// Largest part of an edge's chord along the normal at an end, 0.05 to 1.
     pub max_slope: f64,

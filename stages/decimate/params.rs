@@ -15,7 +15,7 @@ pub struct DecimateParams {
     pub spread: f64,
     /// Least quality of a new face, 0 to 1 (equilateral); slivers below it are refused.
     pub min_quality: f64,
-    /// Largest angle between the normals at the ends of a new edge [deg], 5 to 180.
+    /// Largest angle between the normals at the ends of a new edge, 5 to 180 degrees.
     pub max_turning_deg: f64,
     /// Largest part of a new edge's chord along the normal at an end, 0.05 to 1.
     pub max_slope: f64,

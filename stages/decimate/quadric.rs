@@ -2,7 +2,7 @@
 
 use isospline_geometry::Vec3;
 
-/// `Q(x) = x^T A x + 2 b x + c`: weighted squared distances to planes and points [GH97].
+/// `Q(x) = x^T A x + 2 b x + c`: weighted squared distances to planes and points [GH97, Sec. 4].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Quadric {
     /// `A` as `[xx, xy, xz, yy, yz, zz]`.
