@@ -18,8 +18,8 @@
 //! enclosure of grad f. Then the separating surface is isotopic to `f = 0` in the box: the same
 //! number of components, the same genus of each, nested alike.
 //!
-//! This is the small normal variation of [PV04] with one of its two interval gradients replaced by
-//! the gradient of the mesh itself. Where the test of [PV04] holds in a cell
+//! This is the small normal variation of [PV04, Sec. 3] with one of its two interval gradients
+//! replaced by the gradient of the mesh itself. Where the test of [PV04, Sec. 3] holds in a cell
 //! (`0` not in `<G, G>`, G the interval gradient), this one holds for Kuhn's tetrahedra of that
 //! cell, because the components of grad L are difference quotients along axes, hence members
 //! of G. It needs no balanced tree, and boxes may be cut for the test alone.
