@@ -120,7 +120,7 @@ fn look(field: &dyn Field, flat: [Interval; 3], reach: f64, depth: u32) -> Findi
 
 /// By the plain enclosure or by the mean value form `f(m) + grad f . (x - m)`, whose excess
 /// shrinks with the square of the box: f of high degree beside the box needs it.
-fn excludes_zero(field: &dyn Field, domain: [Interval; 3]) -> bool {
+pub(crate) fn excludes_zero(field: &dyn Field, domain: [Interval; 3]) -> bool {
     let Some(jet) = field.gradient_enclosure(domain) else {
         return field.value_enclosure(domain).is_some_and(|f| !f.may_be_zero());
     };

@@ -63,6 +63,15 @@ pub enum PolygonizeError {
         /// Cells along the longest side at the finest pair of grids compared.
         cells: u32,
     },
+    /// Enclosures leave room for surface at a place where the mesh has none.
+    #[error(
+        "the surface may have a part near ({}, {}, {}) that the grid cannot show",
+        at.x, at.y, at.z
+    )]
+    ThinnerThanGrid {
+        /// A point there.
+        at: Vec3,
+    },
     /// The surface touches more cells than allowed.
     #[error("a grid of {cells} cells a side has more than {limit} cells on the surface")]
     TooManyCells {
@@ -87,6 +96,7 @@ impl Diagnosis for PolygonizeError {
             Self::NotANumber { .. } => "not-a-number",
             Self::SingularPoint { .. } => "singular-point",
             Self::TopologyUnresolved { .. } => "topology-unresolved",
+            Self::ThinnerThanGrid { .. } => "thinner-than-grid",
             Self::TooManyCells { .. } => "too-many-cells",
             Self::EmptyBox => "empty-box",
             Self::Stopped(_) => "stopped",
@@ -97,6 +107,7 @@ impl Diagnosis for PolygonizeError {
         match self {
             Self::LeavesBox { at, .. }
             | Self::NotANumber { at }
+            | Self::ThinnerThanGrid { at }
             | Self::SingularPoint { at, .. } => Some(*at),
             _ => None,
         }
@@ -120,6 +131,7 @@ impl Diagnosis for PolygonizeError {
             Self::TopologyUnresolved { .. } => {
                 "set polygonize.cells higher, or smooth the formula (smin and smax have no kinks)"
             }
+            Self::ThinnerThanGrid { .. } => "set polygonize.cells or target.faces higher",
             Self::TooManyCells { .. } => "ask for fewer faces, or raise polygonize.max_cells",
             Self::EmptyBox => "give model.box a lower bound below its upper bound on every axis",
             Self::Stopped(_) => return None,

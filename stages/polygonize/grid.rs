@@ -12,6 +12,9 @@ pub(crate) type Site = [u32; 3];
 /// Bits a lattice coordinate may take, so that three of them pack into a `u64`.
 const SITE_BITS: u32 = 21;
 
+/// Fewest cells along any side: a box made for a thin sheet must show nodes inside the sheet.
+const LEAST_ACROSS: u32 = 6;
+
 /// A grid of nearly cubic cells over a box.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
@@ -25,11 +28,12 @@ pub(crate) struct Grid {
 
 impl Grid {
     /// The grid with `longest` cells along the longest side of `domain`; other sides get as many
-    /// as keep the cells nearly cubic.
+    /// as keep the cells nearly cubic, but 6 at least where the longest has those.
     pub(crate) fn new(domain: Aabb, longest: u32, levels: u32) -> Self {
         let size = domain.size();
         let step = size.max() / f64::from(longest);
-        let cells = [0, 1, 2].map(|k| ((size[k] / step).round() as u32).clamp(1, longest));
+        let least = LEAST_ACROSS.min(longest);
+        let cells = [0, 1, 2].map(|k| ((size[k] / step).round() as u32).clamp(least, longest));
         Self { domain, cells, levels }
     }
 
@@ -103,11 +107,18 @@ mod tests {
     #[test]
     fn the_grid_ends_exactly_on_the_sides_of_its_box_and_has_nearly_cubic_cells() {
         let domain = Aabb::new(Vec3::new(-0.1, 0.3, 1.0), Vec3::new(0.7, 0.7, 1.3));
-        let grid = Grid::new(domain, 8, 4);
-        assert_eq!(grid.cells, [8, 4, 3]);
+        let grid = Grid::new(domain, 16, 4);
+        assert_eq!(grid.cells, [16, 8, 6]);
         assert_eq!(grid.point([0, 0, 0]), domain.min);
-        assert_eq!(grid.point([128, 64, 48]), domain.max);
-        assert!((grid.lattice_step() - 0.1 / 16.0).abs() < 1e-15);
+        assert_eq!(grid.point([256, 128, 96]), domain.max);
+        assert!((grid.lattice_step() - 0.05 / 16.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_flat_box_gets_six_cells_across() {
+        let domain = Aabb::new(Vec3::zeros(), Vec3::new(1.0, 1.0, 1e-3));
+        assert_eq!(Grid::new(domain, 16, 4).cells, [16, 16, 6]);
+        assert_eq!(Grid::new(domain, 2, 4).cells, [2, 2, 2]);
     }
 
     #[test]

@@ -41,7 +41,8 @@
 //! Otherwise (kinks, fields without intervals, the depth limit) two grids of n >= 32 and 2 n cells
 //! that agree in the Euler characteristic and the volume of every component give
 //! [`TopologyProof::Observed`], which proves nothing: what falls between the nodes of both is
-//! missed.
+//! missed. Where enclosures cannot exclude a part of the surface away from the mesh, the run is
+//! refused instead.
 
 mod box_sides;
 mod bulk;
@@ -52,6 +53,7 @@ pub mod error;
 mod grid;
 mod interpolant;
 mod key_map;
+mod lost_parts;
 mod marching;
 mod observation;
 pub mod params;
@@ -71,6 +73,12 @@ use isospline_artifact::kinds::{Mesh, TopologyProof};
 use isospline_geometry::TriangleMesh;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
 use marching::Pieces;
+use resolution::Survey;
+
+/// Triangles made at least for each face wanted: decimation only takes away.
+const LEAST_OF_FACES: f64 = 1.05;
+/// Grids on which that is tried.
+const MOST_TRIES: u32 = 3;
 
 /// Stage polygonize.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +88,7 @@ pub struct Polygonize {
 
 impl Stage for Polygonize {
     const NAME: &'static str = "polygonize";
-    const VERSION: u32 = 2;
+    const VERSION: u32 = 3;
     type Params = PolygonizeParams;
     type Whole<'a> = ();
     type Rows<'a> = ();
@@ -124,25 +132,54 @@ fn polygonize(
     params: &PolygonizeParams,
     counters: &mut Counters,
 ) -> Result<(TriangleMesh, TopologyProof), PolygonizeError> {
-    let grid = resolution::choose(ctx, params)?;
+    let mut survey = resolution::choose(ctx, params)?;
+    let least = LEAST_OF_FACES * f64::from(params.faces);
+    let mut tries = 1;
+    loop {
+        let cells = f64::from(survey.complex.grid.longest());
+        let mut found = Counters::default();
+        let (mesh, proof) = triangulate(ctx, params, &survey, &mut found)?;
+        let share = mesh.faces.len() as f64 / least;
+        let finer = if params.cells > 0 || share >= 1.0 || tries == MOST_TRIES {
+            None
+        } else {
+            // A little more than the count asks for, so that one try is enough.
+            resolution::finer(ctx, params, &survey, (1.1 * cells / share.sqrt()).ceil())?
+        };
+        let Some(finer) = finer else {
+            *counters = found;
+            ctx.host.progress(1, 1)?;
+            return Ok((mesh, proof));
+        };
+        survey = finer;
+        tries += 1;
+    }
+}
+
+fn triangulate(
+    ctx: &Ctx<'_>,
+    params: &PolygonizeParams,
+    survey: &Survey,
+    counters: &mut Counters,
+) -> Result<(TriangleMesh, TopologyProof), PolygonizeError> {
+    let mut complex = survey.complex.clone();
+    let grid = complex.grid.clone();
     ctx.host.progress(0, 1)?;
-    let cells = surface_cells::surface_cells(ctx, &grid, params.max_cells)?;
-    let mut complex = Complex::new(ctx, grid.clone(), &cells)?;
-    let sides_are_clear = box_sides::are_clear(ctx, &grid, &cells).or_else(|leaves_box| {
-        // A larger box would not mend a singular surface: that is the better message.
-        proof::no_singular_point(ctx, &complex).and(Err(leaves_box))
-    })?;
+    let sides_are_clear =
+        box_sides::are_clear(ctx, &grid, &survey.cells).or_else(|leaves_box| {
+            // A larger box would not mend a singular surface: that is the better message.
+            proof::no_singular_point(ctx, &complex).and(Err(leaves_box))
+        })?;
     counters.count("cells", complex.n_cells() as u64);
     counters.max("cells_a_side", f64::from(grid.longest()));
-    let proof = if sides_are_clear && proof::prove(ctx, &mut complex, params, counters)? {
-        TopologyProof::Certified
-    } else {
-        complex = observation::observe(ctx, &grid, params)?;
-        TopologyProof::Observed
-    };
-    let mesh = extract(ctx, &complex)?;
-    ctx.host.progress(1, 1)?;
-    Ok((mesh, proof))
+    let failed = proof::prove(ctx, &mut complex, params, counters)?;
+    if sides_are_clear && failed.is_empty() {
+        return Ok((extract(ctx, &complex)?, TopologyProof::Certified));
+    }
+    let doubtful = lost_parts::boxes(&complex, &failed);
+    let observed = observation::observe(ctx, &grid, params, &doubtful)?;
+    lost_parts::none_is_lost(ctx, &observed, &doubtful)?;
+    Ok((extract(ctx, &observed)?, TopologyProof::Observed))
 }
 
 fn extract(ctx: &Ctx<'_>, complex: &Complex) -> Result<TriangleMesh, PolygonizeError> {

@@ -4,15 +4,19 @@ use crate::complex::Complex;
 use crate::crossing;
 use crate::error::PolygonizeError;
 use crate::grid::Grid;
+use crate::lost_parts::middle;
 use crate::marching::Pieces;
 use crate::params::PolygonizeParams;
-use crate::surface_cells::{MOST_DENSE_CELLS, surface_cells};
+use crate::surface_cells::{MOST_DENSE_CELLS, has_intervals, surface_cells};
 use crate::{box_sides, resolution};
 use isospline_geometry::TriangleMesh;
+use isospline_implicit::Interval;
 use isospline_stage::Ctx;
 
 /// Fewest cells along the longest side of a grid that is observed.
 const LEAST_CELLS: u32 = 32;
+/// Most cells along the longest side, unless more are asked for: where enclosures prune the cells.
+const MOST_CELLS: u32 = 2048;
 /// Difference of the volumes of a component that two resolutions may show.
 const VOLUME_TOLERANCE: f64 = 0.05;
 
@@ -26,28 +30,34 @@ struct Component {
 /// The coarsest complex, from the grid given upwards, whose components agree with those of the
 /// grid twice as fine in Euler characteristic and volume.
 ///
+/// `doubtful` are the boxes that may hold surface without a proof.
+///
 /// # Errors
-/// [`PolygonizeError::TopologyUnresolved`] if no two resolutions agree within the limits.
+/// [`PolygonizeError::TopologyUnresolved`] if no two resolutions agree within the limits,
+/// [`PolygonizeError::ThinnerThanGrid`] if a grid shows nothing though there are doubtful boxes.
 pub(crate) fn observe(
     ctx: &Ctx<'_>,
     grid: &Grid,
     params: &PolygonizeParams,
+    doubtful: &[[Interval; 3]],
 ) -> Result<Complex, PolygonizeError> {
     let mut coarse = at(ctx, grid, grid.longest().max(LEAST_CELLS), params)?;
+    let many = if has_intervals(ctx, grid) { MOST_CELLS } else { MOST_DENSE_CELLS };
+    let most = many.max(2 * grid.longest()).min(Grid::most_cells(grid.levels));
     let mut rounds = 0;
     loop {
         rounds += 1;
         ctx.host.progress(rounds, rounds + 1)?;
         let cells = coarse.grid.longest();
         let unresolved = PolygonizeError::TopologyUnresolved { cells };
-        if 2 * cells > MOST_DENSE_CELLS.max(2 * grid.longest()).min(Grid::most_cells(grid.levels)) {
+        if 2 * cells > most {
             return Err(unresolved);
         }
         let fine = match at(ctx, grid, 2 * cells, params) {
             Err(PolygonizeError::TooManyCells { .. }) => return Err(unresolved),
             found => found?,
         };
-        if agree(&components(ctx, &coarse)?, &components(ctx, &fine)?) {
+        if agree(&components(ctx, &coarse, doubtful)?, &components(ctx, &fine, doubtful)?) {
             return Ok(coarse);
         }
         coarse = fine;
@@ -66,10 +76,17 @@ fn at(
 }
 
 /// Components in the order of characteristic and volume.
-fn components(ctx: &Ctx<'_>, complex: &Complex) -> Result<Vec<Component>, PolygonizeError> {
+fn components(
+    ctx: &Ctx<'_>,
+    complex: &Complex,
+    doubtful: &[[Interval; 3]],
+) -> Result<Vec<Component>, PolygonizeError> {
     let pieces = Pieces::of(complex);
     if pieces.crossings.is_empty() {
-        return Err(resolution::empty_level_set(ctx));
+        return Err(match doubtful.first() {
+            Some(part) => PolygonizeError::ThinnerThanGrid { at: middle(part) },
+            None => resolution::empty_level_set(ctx),
+        });
     }
     box_sides::no_crossing_on_sides(ctx, complex, &pieces.crossings)?;
     let mesh = pieces.triangulate(crossing::linear_positions(complex, &pieces.crossings));

@@ -18,7 +18,8 @@ const SEARCHES: usize = 16;
 const BUDGET: usize = 1;
 const LEAST_BUDGET: usize = 10_000;
 
-/// Refines `complex` until all its tetrahedra pass the test; false if they will not.
+/// Refines `complex` until all its tetrahedra pass the test; returns those that will not: all
+/// surface that the mesh may lack lies in them.
 ///
 /// # Errors
 /// [`PolygonizeError::SingularPoint`] where refinement converges onto one, and what
@@ -28,7 +29,7 @@ pub(crate) fn prove(
     complex: &mut Complex,
     params: &PolygonizeParams,
     counters: &mut Counters,
-) -> Result<bool, PolygonizeError> {
+) -> Result<Vec<Tetrahedron>, PolygonizeError> {
     let mut failed = failing_cells(ctx, complex);
     let smallest = complex.grid.scale() >> params.max_depth;
     let mut budget = LEAST_BUDGET.max(BUDGET * 6 * complex.n_cells());
@@ -38,7 +39,7 @@ pub(crate) fn prove(
         search_singular_points(ctx, complex, &failed)?;
         counters.count("tetrahedra_refined", failed.len() as u64);
         if failed.len() > budget || failed.iter().any(|t| width(complex, t) <= smallest) {
-            return Ok(false);
+            return Ok(failed);
         }
         budget -= failed.len();
         rounds += 1;
@@ -46,7 +47,7 @@ pub(crate) fn prove(
         failed = failing_tetrahedra(ctx, complex, &new);
     }
     counters.count("refinement_rounds", rounds);
-    Ok(true)
+    Ok(failed)
 }
 
 /// Searches singular points where the unrefined complex fails the test.
@@ -97,7 +98,7 @@ fn failing_tetrahedra(
 }
 
 /// The cube of the bisection tree that a tetrahedron lies in: its lower corner and width.
-fn home(complex: &Complex, t: &Tetrahedron) -> (Site, u32) {
+pub(crate) fn home(complex: &Complex, t: &Tetrahedron) -> (Site, u32) {
     let width = width(complex, t);
     let sites = t.map(|n| complex.site(n));
     let least = |k: usize| sites.iter().map(|s| s[k]).min().expect("invariant: four nodes");

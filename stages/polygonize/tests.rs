@@ -220,6 +220,65 @@ fn the_number_of_cells_can_be_set() {
     assert!(piece.rows.face.len() > 4000, "{}", piece.rows.face.len());
 }
 
+/// Half sides of a box, wanted faces.
+fn mesh_of(text: &str, half: [f64; 3], faces: u32) -> Piece<Mesh> {
+    let half = Vec3::from(half);
+    run(&formula(text), Aabb::new(-half, half), &with_faces(faces)).unwrap()
+}
+
+#[test]
+fn thin_surfaces_are_found_with_their_topology() {
+    for (text, half, euler) in [
+        ("x^2+y^2+(z/0.03)^2-1", [1.2, 1.2, 0.0354], 2),
+        ("x^2+y^2+(z/0.03)^2-1", [1.2, 1.2, 1.3], 2),
+        ("(x/10)^8+(y/10)^8+(z/0.2)^2-1", [11.0, 11.0, 0.3], 2),
+        ("(sqrt(x^2+y^2)-1)^2+z^2-1e-4", [1.2, 1.2, 1.2], 0),
+        ("(sqrt(x^2+y^2)-1)^2+z^2-1e-4", [1.2, 1.2, 0.013], 0),
+    ] {
+        let piece = mesh_of(text, half, 1000);
+        assert!(piece.rows.face.len() >= 1050, "{text}: {}", piece.rows.face.len());
+        let rows = piece.rows;
+        let found = (rows.topology[0].components, rows.topology[0].euler_characteristic);
+        assert_eq!(found, (1, euler), "{text} in {half:?}");
+    }
+}
+
+#[test]
+fn small_parts_are_meshed_or_refused_with_their_place_but_never_lost() {
+    for (text, place) in [
+        ("(x^2+y^2+z^2-1)*((x-1.5)^2+y^2+z^2-1e-8)", [1.5, 0.0, 0.0]),
+        ("min(sqrt(x^2+y^2+z^2)-1, sqrt((x-1.5)^2+(y-0.3)^2+z^2)-0.001)", [1.5, 0.3, 0.0]),
+        ("max(sqrt(x^2+y^2+z^2)-1, 0.001-sqrt((x-0.5)^2+(y-0.3)^2+z^2))", [0.5, 0.3, 0.0]),
+    ] {
+        match run(&formula(text), cube(2.0), &with_faces(1000)) {
+            Ok(piece) => assert_eq!(piece.rows.topology[0].components, 2, "{text}"),
+            Err(error) => {
+                assert_eq!(error.code(), "thinner-than-grid", "{text}: {error}");
+                let at = error.place().unwrap();
+                assert!((at - Vec3::from(place)).norm() < 0.1, "{text}: {at}");
+            }
+        }
+    }
+}
+
+#[test]
+fn metaballs_with_poles_inside_are_meshed() {
+    let text = "1-0.2/((x-0.4)^2+y^2+z^2)-0.2/((x+0.4)^2+y^2+z^2)";
+    let topology = mesh_of(text, [2.0; 3], 1000).rows.topology[0];
+    assert_eq!((topology.components, topology.euler_characteristic), (1, 2));
+}
+
+#[test]
+fn small_surfaces_in_a_large_box_get_the_faces_wanted() {
+    for (text, components) in
+        [("((x-1)^2+y^2+z^2)*((x+1)^2+y^2+z^2)-1e-4", 2), ("((x^2+y^2+z^2+1)^2-4*x^2)-0.0001", 2)]
+    {
+        let rows = mesh_of(text, [2.2, 1.2, 1.2], 2000).rows;
+        assert_eq!(rows.topology[0].components, components);
+        assert!(rows.face.len() >= 2000, "{text}: {}", rows.face.len());
+    }
+}
+
 fn small_chair() -> Fixture<Polygonize> {
     Fixture::new(formula(CHAIR), cube(5.5)).with_params(with_faces(1000))
 }
