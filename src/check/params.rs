@@ -50,6 +50,25 @@ pub struct Expected {
 const DEFAULT_ERROR: f64 = 1e-3;
 
 impl CheckParams {
+    /// Names the first limit out of its range: `(key, what is wrong)`.
+    ///
+    /// # Errors
+    /// The key and a sentence with the range.
+    pub fn validate(&self) -> Result<(), (&'static str, String)> {
+        let limits = [
+            ("gap", Some(self.gap), 1.0),
+            ("g1_angle_deg", Some(self.g1_angle_deg), 180.0),
+            ("vertices", Some(self.vertices), 1.0),
+            ("error", self.error, 1.0),
+        ];
+        for (key, limit, most) in limits {
+            if let Some(limit) = limit.filter(|limit| !(0.0..=most).contains(limit)) {
+                return Err((key, format!("{limit} is not within 0 to {most}")));
+            }
+        }
+        Ok(())
+    }
+
     /// The limit of `rel_error_max`: the table's own, then the model's tolerance, then 1e-3.
     pub fn error_limit(&self, expected: &Expected) -> f64 {
         self.error.or(expected.tolerance).unwrap_or(DEFAULT_ERROR)
@@ -65,6 +84,21 @@ mod tests {
         assert_eq!(toml::from_str::<CheckParams>("").unwrap(), CheckParams::default());
         let refused = toml::from_str::<CheckParams>("gpa = 1e-14").unwrap_err();
         assert!(refused.to_string().contains("gpa"), "{refused}");
+    }
+
+    #[test]
+    fn limits_that_nothing_or_everything_passes_are_refused() {
+        assert_eq!(CheckParams::default().validate(), Ok(()));
+        for (text, key) in [
+            ("gap = nan", "gap"),
+            ("gap = -1.0", "gap"),
+            ("g1_angle_deg = 181.0", "g1_angle_deg"),
+            ("vertices = inf", "vertices"),
+            ("error = 2.0", "error"),
+        ] {
+            let refused = toml::from_str::<CheckParams>(text).unwrap().validate().unwrap_err();
+            assert_eq!(refused.0, key, "{text}");
+        }
     }
 
     #[test]
