@@ -11,6 +11,12 @@ pub enum ExportError {
     /// The file could not be put in its place.
     #[error(transparent)]
     File(#[from] StoreError),
+    /// There is something at the path that an export must not replace.
+    #[error("{what} stands there, which is no file that can be replaced")]
+    NotRegular {
+        /// What it is.
+        what: &'static str,
+    },
     /// `samples` is outside its range.
     #[error("samples = {samples} is not in 1 ..= {max}")]
     Samples {

@@ -5,9 +5,10 @@ use crate::{ExportError, Format, Options, write};
 use isospline_artifact::kinds::PatchesView;
 use isospline_artifact::{Durability, write_file_atomic};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Writes `patches` to the file `path`, which is replaced only by a whole export.
+/// Writes `patches` to the file `path`, which is replaced only by a whole export; where `path` is
+/// a symbolic link, the file that it leads to.
 ///
 /// # Errors
 /// [`ExportError`]; the file is then as it was before.
@@ -17,8 +18,9 @@ pub fn write_file(
     options: &Options,
     path: &Path,
 ) -> Result<(), ExportError> {
+    let path = replaceable(path)?;
     let mut refused = None;
-    let done = write_file_atomic(path, Durability::Fast, |out| {
+    let done = write_file_atomic(&path, Durability::Fast, |out| {
         write(format, patches, options, out).map_err(|error| match error {
             ExportError::Io(io) => io,
             other => {
@@ -31,6 +33,19 @@ pub fn write_file(
     match refused {
         Some(error) => Err(error),
         None => Ok(done?),
+    }
+}
+
+/// Where the file itself is, links followed; devices, pipes and folders are refused.
+fn replaceable(path: &Path) -> Result<PathBuf, ExportError> {
+    let refuse = |what| Err(ExportError::NotRegular { what });
+    match std::fs::metadata(path) {
+        Ok(data) if data.is_file() => Ok(std::fs::canonicalize(path)?),
+        Ok(data) if data.is_dir() => refuse("a folder"),
+        Ok(_) => refuse("a device or a pipe"),
+        Err(_) if path.is_symlink() => refuse("a link that leads nowhere"),
+        // Whatever else is the matter, writing says it better.
+        Err(_) => Ok(path.to_owned()),
     }
 }
 
@@ -61,6 +76,29 @@ mod tests {
         assert!(matches!(refused, Err(ExportError::Incoherent { row: 0, .. })), "{refused:?}");
         assert_eq!(read_npz_file(&path).unwrap().faces, patches.face);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_what_is_no_file_is_left_alone() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let patches = sample::ball_and_ring();
+        let write =
+            |name: &str| write_file(Format::Npz, &patches.view(), &Options::default(), &at(name));
+        write("file").unwrap();
+        symlink(at("file"), at("link")).unwrap();
+        symlink("/dev/null", at("device")).unwrap();
+        symlink(at("nothing"), at("lost")).unwrap();
+        std::fs::create_dir(at("folder")).unwrap();
+        write("link").unwrap();
+        assert!(at("link").is_symlink() && !at("file").is_symlink());
+        for name in ["device", "lost", "folder"] {
+            let refused = write(name);
+            assert!(matches!(refused, Err(ExportError::NotRegular { .. })), "{name}: {refused:?}");
+        }
+        assert!(at("device").is_symlink() && at("lost").is_symlink());
     }
 
     #[test]

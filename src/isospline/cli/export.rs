@@ -28,6 +28,7 @@ fn failure(error: &ExportError, path: &std::path::Path) -> Failure {
         ExportError::Io(_) | ExportError::File(_) => {
             Failure::io(message).helped("see whether the folder is there")
         }
+        ExportError::NotRegular { .. } => Failure::io(message).helped("give another path with -o"),
         ExportError::Samples { .. } | ExportError::TooLarge { .. } => Failure::usage(message),
         ExportError::Degree { .. } | ExportError::Incoherent { .. } => Failure::damaged(message),
     }
