@@ -82,6 +82,26 @@ fn nonsense_in_the_model_file() {
             exit: 11,
             says: &["network.samples", "out-of-range", "7 to 129"],
         },
+        Case {
+            text: "[model]\nformula = \"x\"\n[check]\ngap = nan\n",
+            exit: 11,
+            says: &["check.gap", "0 to 1", "bad.toml:4"],
+        },
+        Case {
+            text: "[model]\nformula = \"x\"\n[target]\nfaces = 1000000000\n",
+            exit: 11,
+            says: &["`target.faces`", "bad.toml:4"],
+        },
+        Case {
+            text: "[model]\nformula = \"x\"\nbox = [[-1e308, 1e308], [-1, 1], [-1, 1]]\n",
+            exit: 11,
+            says: &["model.box", "overflow", "bad.toml:3"],
+        },
+        Case {
+            text: "[model]\nformula = \"x\"\n[model.parameters]\n\"a b\" = 1.0\n",
+            exit: 11,
+            says: &["model.parameters.a b", "is not a name", "bad.toml:4"],
+        },
         Case { text: "[model]\nname = \"a\"\n", exit: 11, says: &["model.formula", "missing"] },
     ]);
 }
@@ -96,6 +116,39 @@ fn formulas_with_a_caret_below_the_place() {
         },
         Case { text: model("x^2 + (y"), exit: 12, says: &["never closed", "model.formula:1:7"] },
     ]);
+}
+
+#[test]
+fn a_long_formula_is_not_searched_for_ever_and_a_long_line_is_cut() {
+    let terms: String = (0..30_000).map(|k| format!("+0.0000001*(x - {k}.5)^2")).collect();
+    let sandbox = Sandbox::new();
+    let write = |end: &str| {
+        sandbox.write("long.toml", format!("[model]\nformula = \"x^2+y^2+z^2-1{terms}{end}\"\n"));
+        sandbox.isospline(&["run", "long.toml", "--out", "out", "--no-sync"])
+    };
+    let endless = write("");
+    assert_eq!(endless.code, 11, "{}", endless.stderr);
+    assert!(endless.stderr.contains("state model.box"), "{}", endless.stderr);
+    let unknown = write("+ nope");
+    assert_eq!(unknown.code, 12, "{}", unknown.stderr);
+    assert!(unknown.stderr.contains("unknown name `nope`"), "{}", unknown.stderr);
+    assert!(unknown.stderr.len() < 1000, "{}", unknown.stderr.len());
+}
+
+#[test]
+fn a_stage_that_fails_tells_where() {
+    let sandbox = Sandbox::new();
+    sandbox.write("hole.obj", "v 1 0 0\nv 0 1 0\nv 0 0 0.75\nf 1 2 3\n");
+    sandbox
+        .write("hole.toml", format!("[model]\nformula = \"x\"\n{BOX}base_mesh = \"hole.obj\"\n"));
+    let outcome =
+        sandbox.isospline(&["run", "hole.toml", "--json", "--set", "model.formula=x^2+y^2+z^2-1"]);
+    assert_eq!(outcome.code, 26, "{}", outcome.stderr);
+    let last: serde_json::Value =
+        serde_json::from_str(outcome.stdout.lines().last().unwrap()).unwrap();
+    let place: Vec<f64> = serde_json::from_value(last["place"].clone()).unwrap();
+    let told = format!("({}, {}, {})", place[0], place[1], place[2]);
+    assert!(last["message"].as_str().unwrap().contains(&told), "{last}");
 }
 
 #[test]
@@ -153,7 +206,8 @@ fn a_store_of_another_version_is_told_from_a_damaged_one() {
 #[test]
 fn usage_errors_exit_with_2() {
     let sandbox = Sandbox::new();
-    let cases: [&[&str]; 5] = [
+    let cases: [&[&str]; 6] = [
+        &["check", ".", "--model", "a.toml"],
         &["run"],
         &["run", "a.toml", "--formula", "x"],
         &["export", "out", "--format", "doc"],

@@ -29,6 +29,45 @@ fn a_formula_that_is_positive_inside_is_turned_and_that_is_told() {
 }
 
 #[test]
+fn a_formula_may_begin_with_a_minus_and_be_small() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "--formula", "-(x^2+y^2+z^2)*1e18+1", "--set", "target.faces=200"];
+    let told = sandbox.isospline(&[&args[..], &["--set", "model.box_limit=1e-8"]].concat()).stderr;
+    assert!(told.contains("found [[-1."), "{told}");
+    assert!(told.contains("e-9"), "{told}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_the_program_while_no_stage_runs() {
+    let terms: String = (0..200_000).map(|k| format!("+0.0000001*sin({k}*x)")).collect();
+    let sandbox = Sandbox::new();
+    let text =
+        format!("[model]\nformula = \"x^2+y^2+z^2-1{terms}\"\nbox = [[-2, 2], [-2, 2], [-2, 2]]\n");
+    sandbox.write("slow.toml", text);
+    let mut child = sandbox.command(&["run", "slow.toml"]).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    let id = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(!sandbox.path("out").exists());
+}
+
+#[test]
+fn a_run_does_not_call_damaged_rows_up_to_date() {
+    let sandbox = Sandbox::new();
+    sandbox.converts("torus", &SMALL);
+    let path = sandbox.path("out/11-fairing.isos");
+    let sound = std::fs::read(&path).unwrap();
+    let mut damaged = sound.clone();
+    damaged[sound.len() / 2] ^= 1;
+    sandbox.write("out/11-fairing.isos", &damaged);
+    let outcome = sandbox.converts("torus", &SMALL);
+    assert!(outcome.stderr.contains("made again"), "{}", outcome.stderr);
+    assert!(std::fs::read(&path).unwrap() == sound);
+}
+
+#[test]
 fn a_folder_is_checked_without_its_model_file() {
     let sandbox = Sandbox::new();
     let config = std::fs::read_to_string(config_path("torus")).unwrap();

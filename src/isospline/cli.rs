@@ -2,9 +2,11 @@
 
 pub(crate) mod args;
 mod check;
+mod excerpt;
 mod export;
 pub(crate) mod failure;
-mod output;
+pub(crate) mod interrupt;
+pub(crate) mod output;
 mod progress;
 mod run;
 mod status;
@@ -12,13 +14,13 @@ mod tables;
 
 use args::{Cli, Command};
 use failure::Failure;
-use std::sync::atomic::AtomicBool;
+use interrupt::Interrupt;
 
 /// Carries out a command; failures are shown on standard error.
-pub(crate) fn dispatch(args: &Cli, stop: &AtomicBool) -> u8 {
+pub(crate) fn dispatch(args: &Cli, interrupt: &Interrupt) -> u8 {
     let (outcome, json) = match &args.command {
-        Command::Run(args) => (run::run(args, stop), args.model.json),
-        Command::Stage(args) => (run::stage(args, stop), args.model.json),
+        Command::Run(args) => (run::run(args, interrupt), args.model.json),
+        Command::Stage(args) => (run::stage(args, interrupt), args.model.json),
         Command::Status { dir } => (status::status(dir), false),
         Command::Inspect { file, verify } => (status::inspect(file, *verify), false),
         Command::Check(args) => (check::check(args), args.json),

@@ -3,20 +3,25 @@
 mod cli;
 
 use clap::Parser;
+use std::panic::{PanicHookInfo, catch_unwind, set_hook};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Raised by Ctrl-C: the run ends after the tasks in hand.
-static STOP: AtomicBool = AtomicBool::new(false);
+/// Raised by Ctrl-C.
+static INTERRUPT: cli::interrupt::Interrupt = cli::interrupt::Interrupt::new();
 
 fn main() -> ExitCode {
     let args = cli::args::Cli::parse();
     // Without the handler Ctrl-C ends the process at once: no file is left half-written then
     // either, so a system that refuses it is no error.
-    let _ = ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(i32::from(cli::failure::STOPPED));
-        }
-    });
-    ExitCode::from(cli::dispatch(&args, &STOP))
+    let _ = ctrlc::set_handler(|| INTERRUPT.raise());
+    set_hook(Box::new(tell_panic));
+    let done = catch_unwind(move || cli::dispatch(&args, &INTERRUPT));
+    ExitCode::from(done.unwrap_or(cli::failure::BUG))
+}
+
+/// A panic is a bug; one line is enough to find it.
+fn tell_panic(info: &PanicHookInfo<'_>) {
+    let message = info.payload_as_str().unwrap_or("no message").replace('\n', " ");
+    let place = info.location().map(|at| format!(" at {}:{}", at.file(), at.line()));
+    cli::output::note(&format!("bug of isospline: {message}{}", place.unwrap_or_default()));
 }

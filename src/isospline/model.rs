@@ -1,10 +1,11 @@
 //! A model file becomes a field, a box and a base mesh: what the stages work on.
 
+use crate::box_search;
 use crate::config::{ConfigError, Domain, Inside, ModelFile};
 use isospline_artifact::kinds::{Mesh, Topology};
 use isospline_geometry::Aabb;
 use isospline_implicit::{
-    BoundsError, Field, Formula, FormulaError, InsideError, Oriented, auto_box, resolve_inside,
+    BoundsError, Field, Formula, FormulaError, InsideError, Oriented, resolve_inside,
 };
 use isospline_import::{ObjError, parse_obj};
 use isospline_pipeline::{Given, ModelKey};
@@ -28,6 +29,12 @@ pub enum ModelError {
     /// No box holds the surface.
     #[error(transparent)]
     Box(#[from] BoundsError),
+    /// The search for a box would take too long.
+    #[error("model.box: a formula of {operations} operations is too long to find its box")]
+    LongFormula {
+        /// Operations of the formula.
+        operations: usize,
+    },
     /// The side that is solid cannot be told.
     #[error(transparent)]
     Inside(#[from] InsideError),
@@ -78,9 +85,11 @@ impl Model {
         let formula = Formula::parse(&model.formula, &model.parameters)
             .map_err(|error| ModelError::formula(&model.formula, error))?;
         let level = Oriented { inner: &formula, level: model.level, flipped: false };
-        let domain = match model.domain.given() {
-            Some(domain) => domain,
-            None => auto_box(&level, model.box_limit)?,
+        let domain = if let Some(domain) = model.domain.given() {
+            domain
+        } else {
+            let operations = formula.canonical().lines().count();
+            box_search::find(&level, operations, model.box_limit)?
         };
         let field = oriented(formula, model.level, model.inside, &domain)?;
         let base_mesh = model.base_mesh.as_deref().map(read_base_mesh).transpose()?;
@@ -111,7 +120,7 @@ impl Model {
         let mut remarks = Vec::new();
         if self.file.model.domain == Domain::Auto {
             let (min, max) = (self.domain.min, self.domain.max);
-            let sides = [0, 1, 2].map(|k| format!("[{:.4}, {:.4}]", min[k], max[k]));
+            let sides = [0, 1, 2].map(|k| format!("[{:?}, {:?}]", short(min[k]), short(max[k])));
             remarks.push(format!("model.box is auto: found [{}]", sides.join(", ")));
         }
         if self.field.flipped && self.file.model.inside == Inside::Auto {
@@ -120,6 +129,11 @@ impl Model {
         }
         remarks
     }
+}
+
+/// The number to five digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.4e}").parse().unwrap_or(x)
 }
 
 fn read_base_mesh(path: &Path) -> Result<Given, ModelError> {

@@ -108,7 +108,7 @@ pub(crate) struct ModelArgs {
     #[arg(value_name = "MODEL.toml", required_unless_present = "formula")]
     pub(crate) model: Option<PathBuf>,
     /// A formula in x, y, z in place of a model file
-    #[arg(long, value_name = "TEXT", conflicts_with = "model")]
+    #[arg(long, value_name = "TEXT", conflicts_with = "model", allow_hyphen_values = true)]
     pub(crate) formula: Option<String>,
     /// The model folder; default out/<model name>
     #[arg(long, value_name = "DIR")]

@@ -15,6 +15,10 @@ use std::path::Path;
 /// Measures a surface and holds it against its limits.
 pub(crate) fn check(args: &CheckArgs) -> Result<u8, Failure> {
     let (report, file) = match &args.model {
+        Some(_) if args.path.is_dir() => {
+            let message = format!("{} is a folder, which has its own model", args.path.display());
+            return Err(Failure::usage(message).helped("leave out --model"));
+        }
         Some(model) => check_export(&args.path, model)?,
         None if args.path.is_file() => {
             let message = format!("{} is a file: its model is needed", args.path.display());

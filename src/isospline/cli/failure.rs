@@ -1,11 +1,12 @@
 //! Every error as the user sees it: message, place, help and exit code.
 
+use crate::cli::excerpt::Excerpt;
 use isospline::config::{ConfigError, Place};
 use isospline::{FolderError, ModelError};
 use isospline_artifact::{Damage, StoreError};
 use isospline_implicit::{BoundsError, InsideError};
 use isospline_pipeline::RunError;
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use miette::{Diagnostic, LabeledSpan, SourceCode};
 use std::error::Error;
 use std::fmt;
 use std::ops::Range;
@@ -17,20 +18,21 @@ pub(crate) struct Failure {
     code: &'static str,
     exit: u8,
     help: Option<String>,
+    place: Option<[f64; 3]>,
     pointer: Option<Box<Pointer>>,
 }
 
 /// A place in a text.
 #[derive(Debug)]
 struct Pointer {
-    text: NamedSource<String>,
+    text: Excerpt,
     label: LabeledSpan,
 }
 
 impl Pointer {
     fn new(name: &str, text: &str, range: Range<usize>) -> Self {
-        let text = NamedSource::new(name, text.to_owned());
-        Self { text, label: LabeledSpan::at(range, "here") }
+        let (text, label) = Excerpt::new(name, text, range);
+        Self { text, label }
     }
 }
 
@@ -51,7 +53,7 @@ const OTHER_VERSION: u8 = 30;
 const DAMAGED: u8 = 31;
 const LOCKED: u8 = 32;
 const IO: u8 = 33;
-const BUG: u8 = 70;
+pub(crate) const BUG: u8 = 70;
 pub(crate) const STOPPED: u8 = 130;
 
 /// Exit codes of the stages' own error codes; others are [`OTHER_SURFACE`].
@@ -70,7 +72,8 @@ const STAGE_EXITS: [(&str, u8); 10] = [
 
 impl Failure {
     pub(crate) fn new(exit: u8, code: &'static str, message: impl Into<String>) -> Self {
-        Self { message: message.into(), code, exit, help: None, pointer: None }
+        let message = clipped(message.into());
+        Self { message, code, exit, help: None, place: None, pointer: None }
     }
 
     /// A command line that cannot be carried out.
@@ -91,7 +94,7 @@ impl Failure {
     /// Adds what the user can do.
     #[must_use]
     pub(crate) fn helped(mut self, help: impl Into<String>) -> Self {
-        self.help = Some(help.into());
+        self.help = Some(clipped(help.into()));
         self
     }
 
@@ -103,8 +106,20 @@ impl Failure {
     pub(crate) fn to_json(&self) -> serde_json::Value {
         let (code, exit) = (self.code, self.exit);
         serde_json::json!({
-            "event": "error", "code": code, "exit": exit, "message": self.message, "help": self.help,
+            "event": "error", "code": code, "exit": exit, "message": self.message,
+            "place": self.place, "help": self.help,
         })
+    }
+
+    /// Adds a point of space, to the message too where that does not name it.
+    fn seen_at(mut self, place: Option<[f64; 3]>) -> Self {
+        if let Some([x, y, z]) = place {
+            let told = format!("({x}, {y}, {z})");
+            if !self.message.contains(&told) {
+                self.message = format!("{}, at {told}", self.message);
+            }
+        }
+        Self { place, ..self }
     }
 
     fn placed(mut self, place: Option<&Place>) -> Self {
@@ -158,7 +173,8 @@ impl From<RunError> for Failure {
         if let Some(diagnosis) = error.diagnosis() {
             let code = diagnosis.code();
             let exit = STAGE_EXITS.iter().find(|(known, _)| *known == code);
-            let failure = Self::new(exit.map_or(OTHER_SURFACE, |e| e.1), code, error.to_string());
+            let failure = Self::new(exit.map_or(OTHER_SURFACE, |e| e.1), code, error.to_string())
+                .seen_at(diagnosis.place().map(<[f64; 3]>::from));
             return match diagnosis.help() {
                 Some(help) => failure.helped(help),
                 None => failure,
@@ -170,7 +186,7 @@ impl From<RunError> for Failure {
             RunError::Stopped { .. } => {
                 Self::new(STOPPED, "stopped", message).helped("the same command goes on from there")
             }
-            RunError::NotReady { .. } => Self::new(USAGE, "not-ready", message)
+            RunError::NotReady { .. } => Self::new(DAMAGED, "not-ready", message)
                 .helped("`isospline run` makes everything that is missing"),
             RunError::NoSuchStage { .. } => Self::new(USAGE, "no-such-stage", message),
             RunError::Params { .. } => Self::new(BAD_KEY, "out-of-range", message),
@@ -208,6 +224,9 @@ impl From<ModelError> for Failure {
                 let (exit, code, help) = box_trouble(&error);
                 Self::new(exit, code, message).helped(help)
             }
+            ModelError::LongFormula { .. } => {
+                Self::new(BAD_KEY, "no-box", message).helped("state model.box")
+            }
             ModelError::Inside(error) => {
                 let (exit, code, help) = inside_trouble(&error);
                 Self::new(exit, code, message).helped(help)
@@ -217,6 +236,15 @@ impl From<ModelError> for Failure {
             ModelError::Mesh { .. } => Self::new(BAD_BASE_MESH, "base-mesh", message)
                 .helped("the base mesh is an OBJ of triangles"),
         }
+    }
+}
+
+/// A text cut to what can be read: a value in it may be as long as the user's file.
+fn clipped(text: String) -> String {
+    const LONGEST: usize = 600;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{} ...", &text[..end]),
+        None => text,
     }
 }
 

@@ -22,6 +22,7 @@ pub(crate) fn note(text: &str) {
 /// A time in the unit that keeps three digits.
 pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
+        s if !s.is_finite() => "-".to_owned(),
         s if s >= 100.0 => format!("{s:.0} s"),
         s if s >= 1.0 => format!("{s:.2} s"),
         s if s >= 0.1 => format!("{:.0} ms", 1e3 * s),

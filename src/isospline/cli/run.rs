@@ -2,22 +2,27 @@
 
 use crate::cli::args::{ModelArgs, RunArgs, StageArgs};
 use crate::cli::failure::{CHECK_FAILED, Failure};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::output::{duration, note, say};
 use crate::cli::progress::Progress;
 use crate::cli::tables;
 use isospline::config::{ConfigError, ModelFile};
 use isospline::report::{ConversionReport, fingerprint};
 use isospline::{Model, ModelFolder, REPORT_NOTE};
-use isospline_artifact::Durability;
+use isospline_artifact::{Durability, StoreError};
 use isospline_pipeline::{RunOptions, RunReport};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 
 /// Converts a model and checks the surface.
-pub(crate) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<u8, Failure> {
+pub(crate) fn run(args: &RunArgs, interrupt: &Interrupt) -> Result<u8, Failure> {
     let folder = folder(&args.model)?;
-    let options = RunOptions { from: args.from.as_deref(), ..options(&args.model, stop) };
-    let report = execute(&folder, &options, args.model.json)?;
+    let options = RunOptions { from: args.from.as_deref(), ..options(&args.model) };
+    let mut report = execute(&folder, options, interrupt, args.model.json)?;
+    if matches!(folder.patches(), Err(StoreError::Damaged { .. })) {
+        // Fresh by their headers, but not whole: what is damaged is found and made again.
+        let options = RunOptions { verify: true, ..options };
+        report = execute(&folder, options, interrupt, args.model.json)?;
+    }
     if report.all_fresh()
         && let Some(code) = last_verdict(&folder, &report, args.model.json)?
     {
@@ -32,10 +37,10 @@ pub(crate) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<u8, Failure> {
 }
 
 /// Runs one stage alone.
-pub(crate) fn stage(args: &StageArgs, stop: &AtomicBool) -> Result<u8, Failure> {
+pub(crate) fn stage(args: &StageArgs, interrupt: &Interrupt) -> Result<u8, Failure> {
     let folder = folder(&args.model)?;
-    let options = RunOptions { only: Some(&args.name), ..options(&args.model, stop) };
-    let report = execute(&folder, &options, args.model.json)?;
+    let options = RunOptions { only: Some(&args.name), ..options(&args.model) };
+    let report = execute(&folder, options, interrupt, args.model.json)?;
     if !args.model.json {
         for node in &report.nodes {
             let file = folder.path().join(&node.artifact);
@@ -68,19 +73,22 @@ fn model_file(args: &ModelArgs) -> Result<ModelFile, ConfigError> {
     }
 }
 
-fn options<'a>(args: &ModelArgs, stop: &'a AtomicBool) -> RunOptions<'a> {
+fn options(args: &ModelArgs) -> RunOptions<'static> {
     let defaults = RunOptions::default();
     let threads = args.threads.map_or(defaults.threads, |n| n as usize);
-    RunOptions { threads, stop, ..defaults }
+    RunOptions { threads, ..defaults }
 }
 
 fn execute(
     folder: &ModelFolder,
-    options: &RunOptions<'_>,
+    options: RunOptions<'_>,
+    interrupt: &Interrupt,
     json: bool,
 ) -> Result<RunReport, Failure> {
     let progress = Progress::new(json);
-    let outcome = folder.run(options, &|event| progress.show(event));
+    let outcome = interrupt.heard_by(|stop| {
+        folder.run(&RunOptions { stop, ..options }, &|event| progress.show(event))
+    });
     progress.end();
     Ok(outcome?)
 }

@@ -8,12 +8,14 @@ use std::fmt::Write as _;
 
 /// The stages of a conversion: time, share of the whole, size.
 pub(crate) fn stages(report: &ConversionReport) -> String {
-    let all: f64 = report.stages.iter().map(|s| s.seconds).sum();
+    // The time of a stage whose record is lost is not known.
+    let all: f64 = report.stages.iter().map(|s| s.seconds).filter(|s| s.is_finite()).sum();
     let mut text = format!("{:<15}{:>10}{:>8}{:>10}\n", "stage", "time", "share", "size");
     for stage in &report.stages {
         let share = 100.0 * stage.seconds / all;
+        let share = if share.is_finite() { format!("{share:.1}%") } else { "-".to_owned() };
         let (time, size) = (duration(stage.seconds), size(stage.bytes));
-        writeln!(text, "{:<15}{time:>10}{share:>7.1}%{size:>10}", stage.stage).expect(TEXT);
+        writeln!(text, "{:<15}{time:>10}{share:>8}{size:>10}", stage.stage).expect(TEXT);
     }
     write!(text, "{:<15}{:>10}", "whole run", duration(report.seconds)).expect(TEXT);
     text

@@ -62,6 +62,16 @@ pub enum ConfigError {
         /// Where.
         place: Option<Place>,
     },
+    /// A parameter that no formula can name.
+    #[error("`{key}` is no parameter{}: {message}", line_of(place.as_ref()))]
+    ParameterName {
+        /// Dotted path.
+        key: String,
+        /// What is wrong with the name.
+        message: String,
+        /// Where.
+        place: Option<Place>,
+    },
     /// A key without which there is no model.
     #[error("`{key}` is missing")]
     Missing {
@@ -88,6 +98,7 @@ impl ConfigError {
             Self::UnknownKey { place, .. }
             | Self::WrongType { place, .. }
             | Self::OutOfRange { place, .. }
+            | Self::ParameterName { place, .. }
             | Self::Elsewhere { place, .. } => place.as_ref(),
             Self::Read { .. } | Self::Override { .. } | Self::Missing { .. } => None,
         }
@@ -102,6 +113,7 @@ impl ConfigError {
             Self::UnknownKey { .. } => "unknown-key",
             Self::WrongType { .. } => "wrong-type",
             Self::OutOfRange { .. } => "out-of-range",
+            Self::ParameterName { .. } => "parameter-name",
             Self::Missing { .. } => "missing-key",
             Self::Elsewhere { .. } => "key-set-elsewhere",
         }
@@ -122,6 +134,9 @@ impl ConfigError {
             Self::UnknownKey { known, .. } => format!("known here: {}", known.join(", ")),
             Self::WrongType { .. } | Self::OutOfRange { .. } => {
                 "configs/reference.toml lists each key with its type and range".to_owned()
+            }
+            Self::ParameterName { .. } => {
+                "rename the parameter, here and in the formula".to_owned()
             }
             Self::Missing { key } => format!("add `{key}` to the model file"),
             Self::Elsewhere { instead, .. } => format!("set `{instead}`: all stages take it"),

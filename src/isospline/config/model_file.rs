@@ -4,6 +4,7 @@ use crate::config::tables::{out_of_range, refuse_unknown_tables, typed};
 use crate::config::{ConfigError, Document, StageParams};
 use isospline_check::CheckParams;
 use isospline_geometry::{Aabb, Vec3};
+use isospline_implicit::Formula;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -72,6 +73,9 @@ pub struct ModelTable {
 
 /// Far beyond what a modeller's box has, near enough to be searched in milliseconds.
 const DEFAULT_BOX_LIMIT: f64 = 1000.0;
+
+/// Largest coordinate: the product of three is still a finite number.
+const LARGEST: f64 = 1e100;
 
 impl Default for ModelTable {
     fn default() -> Self {
@@ -166,7 +170,11 @@ impl ModelFile {
         let target: TargetTable = typed(doc, "target", &["tolerance"])?;
         let check: CheckParams = typed(doc, "check", &["error"])?;
         validate_model(doc, &model)?;
+        validate_parameters(doc, &model)?;
         validate_target(doc, &target)?;
+        check
+            .validate()
+            .map_err(|(key, message)| out_of_range(doc, &format!("check.{key}"), message))?;
         let stages = StageParams::read(doc, target.faces)?;
         Ok(Self { model, target, check, stages })
     }
@@ -188,11 +196,9 @@ fn validate_model(doc: &Document, model: &ModelTable) -> Result<(), ConfigError>
     if !model.level.is_finite() {
         return Err(out_of_range(doc, "model.level", "a finite number"));
     }
-    if !(model.box_limit > 0.0 && model.box_limit.is_finite()) {
-        return Err(out_of_range(doc, "model.box_limit", "a finite number above 0"));
-    }
-    if let Some((name, _)) = model.parameters.iter().find(|(_, value)| !value.is_finite()) {
-        return Err(out_of_range(doc, &format!("model.parameters.{name}"), "a finite number"));
+    if !(model.box_limit > 0.0 && model.box_limit <= LARGEST) {
+        let range = format!("a number above 0, at most {LARGEST:e}");
+        return Err(out_of_range(doc, "model.box_limit", range));
     }
     if let Domain::Given(sides) = model.domain {
         let fine = |[lo, hi]: [f64; 2]| lo.is_finite() && hi.is_finite() && lo < hi;
@@ -200,6 +206,26 @@ fn validate_model(doc: &Document, model: &ModelTable) -> Result<(), ConfigError>
             let side = ["x", "y", "z"][axis];
             let message = format!("the {side} side needs two finite numbers, the smaller first");
             return Err(out_of_range(doc, "model.box", message));
+        }
+        if sides.as_flattened().iter().any(|x| x.abs() > LARGEST) {
+            let message = format!("beyond {LARGEST:e} products of coordinates overflow");
+            return Err(out_of_range(doc, "model.box", message));
+        }
+    }
+    Ok(())
+}
+
+fn validate_parameters(doc: &Document, model: &ModelTable) -> Result<(), ConfigError> {
+    for (name, &value) in &model.parameters {
+        let key = format!("model.parameters.{name}");
+        if !value.is_finite() {
+            return Err(out_of_range(doc, &key, "a finite number"));
+        }
+        // What a name may be is the formula's to say.
+        let alone = BTreeMap::from([(name.clone(), value)]);
+        if let Err(error) = Formula::parse("0", &alone) {
+            let (message, place) = (error.kind.to_string(), doc.key_place(&key));
+            return Err(ConfigError::ParameterName { key, message, place });
         }
     }
     Ok(())

@@ -72,9 +72,10 @@ fn stage_table<P: Params>(doc: &Document, stage: &str, faces: u32) -> Result<P, 
         return Err(ConfigError::Elsewhere { key, instead: "target.faces", place });
     }
     let params: P = sized(&typed(doc, stage, &[])?, faces);
-    params
-        .validate()
-        .map_err(|(key, message)| out_of_range(doc, &format!("{stage}.{key}"), message))?;
+    params.validate().map_err(|(key, message)| {
+        let owner = if key == FACES { "target" } else { stage };
+        out_of_range(doc, &format!("{owner}.{key}"), message)
+    })?;
     Ok(params)
 }
 
