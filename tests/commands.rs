@@ -54,6 +54,32 @@ fn ctrl_c_ends_the_program_while_no_stage_runs() {
 }
 
 #[test]
+fn a_folder_with_a_base_mesh_can_be_moved() {
+    let sandbox = Sandbox::new();
+    let mesh = root().join("tests/fixtures/meshes/icosphere_80.obj");
+    std::fs::copy(mesh, sandbox.path("ball.obj")).unwrap();
+    let text = "[model]\nformula = \"x^2+y^2+z^2-1\"\nbase_mesh = \"ball.obj\"\n\
+        box = [[-2, 2], [-2, 2], [-2, 2]]\n[target]\nfaces = 80\n";
+    sandbox.write("ball.toml", text);
+    sandbox.isospline(&["run", "ball.toml", "--out", "out"]);
+    let before = sandbox.isospline(&["check", "out", "--json"]).stdout;
+    assert!(before.contains("\"faces\": 80"), "{before}");
+    std::fs::remove_file(sandbox.path("ball.obj")).unwrap();
+    std::fs::rename(sandbox.path("out"), sandbox.path("moved")).unwrap();
+    assert_eq!(sandbox.isospline(&["check", "moved", "--json"]).stdout, before);
+    let status = sandbox.succeeds(&["status", "moved"]).stdout;
+    assert!(status.lines().all(|line| line.contains("fresh")), "{status}");
+    let again = sandbox.isospline(&["run", "moved/model.toml", "--out", "moved"]);
+    assert!(again.stdout.contains("up to date"), "{}{}", again.stdout, again.stderr);
+    let here = sandbox.path("").display().to_string();
+    for entry in std::fs::read_dir(sandbox.path("moved")).unwrap() {
+        let path = entry.unwrap().path();
+        let bytes = std::fs::read(&path).unwrap();
+        assert!(!bytes.windows(here.len()).any(|w| w == here.as_bytes()), "{path:?}");
+    }
+}
+
+#[test]
 fn a_run_does_not_call_damaged_rows_up_to_date() {
     let sandbox = Sandbox::new();
     sandbox.converts("torus", &SMALL);

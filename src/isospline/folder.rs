@@ -15,6 +15,8 @@ use std::sync::Arc;
 
 /// Name of the canonical model file.
 pub const MODEL_NOTE: &str = "model.toml";
+/// Name of the copy of `model.base_mesh`.
+pub const BASE_MESH_NOTE: &str = "base_mesh.obj";
 /// Name of the last report.
 pub const REPORT_NOTE: &str = "report.json";
 
@@ -182,15 +184,25 @@ impl ModelFolder {
         })
     }
 
-    /// Writes the model file where it is not there or differs.
+    /// Writes the model file, and the base mesh it names, where they are not there or differ.
+    ///
+    /// The mesh stands beside the file, so that the folder can be moved.
     fn save_model(&self) -> Result<(), StoreError> {
         // Taken and freed: a folder that another process works on keeps its model.
         drop(self.store.lock()?);
-        let text = self.model.file.to_toml();
-        if self.store.read_note(MODEL_NOTE)?.as_deref() == Some(text.as_bytes()) {
+        let mut file = self.model.file.clone();
+        if let Some(text) = &self.model.base_mesh_text {
+            file.model.base_mesh = Some(BASE_MESH_NOTE.into());
+            self.bring_up(BASE_MESH_NOTE, text)?;
+        }
+        self.bring_up(MODEL_NOTE, &file.to_toml())
+    }
+
+    fn bring_up(&self, name: &str, text: &str) -> Result<(), StoreError> {
+        if self.store.read_note(name)?.as_deref() == Some(text.as_bytes()) {
             return Ok(());
         }
-        self.store.write_note(MODEL_NOTE, text.as_bytes())
+        self.store.write_note(name, text.as_bytes())
     }
 
     fn store(&self) -> &dyn Store {

@@ -73,6 +73,8 @@ pub struct Model {
     pub domain: Aabb,
     /// The mesh that takes the place of polygonize and decimate.
     pub base_mesh: Option<Given>,
+    /// The OBJ text that it was read from.
+    pub base_mesh_text: Option<String>,
 }
 
 impl Model {
@@ -92,8 +94,9 @@ impl Model {
             box_search::find(&level, operations, model.box_limit)?
         };
         let field = oriented(formula, model.level, model.inside, &domain)?;
-        let base_mesh = model.base_mesh.as_deref().map(read_base_mesh).transpose()?;
-        Ok(Self { file, field, domain, base_mesh })
+        let read = model.base_mesh.as_deref().map(read_base_mesh).transpose()?;
+        let (base_mesh, base_mesh_text) = read.unzip();
+        Ok(Self { file, field, domain, base_mesh, base_mesh_text })
     }
 
     /// What of the model may change the output.
@@ -136,12 +139,13 @@ fn short(x: f64) -> f64 {
     format!("{x:.4e}").parse().unwrap_or(x)
 }
 
-fn read_base_mesh(path: &Path) -> Result<Given, ModelError> {
+fn read_base_mesh(path: &Path) -> Result<(Given, String), ModelError> {
     let text = std::fs::read_to_string(path)
         .map_err(|source| ModelError::MeshUnreadable { path: path.to_owned(), source })?;
     let (position, face) =
         parse_obj(&text).map_err(|error| ModelError::Mesh { path: path.to_owned(), error })?;
-    Ok(given_mesh(path.display().to_string(), position, face))
+    // No path: what is kept of a run says nothing of the machine.
+    Ok((given_mesh("model.base_mesh".to_owned(), position, face), text))
 }
 
 /// Rows for stage import, which finds out what they are worth.
