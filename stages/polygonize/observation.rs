@@ -17,6 +17,8 @@ use isospline_stage::Ctx;
 const LEAST_CELLS: u32 = 32;
 /// Most cells along the longest side, unless more are asked for: where enclosures prune the cells.
 const MOST_CELLS: u32 = 2048;
+/// Cells of such a grid that the surface may touch: thin tubes and small parts have fewer.
+const MOST_FEW_CELLS: u32 = 500_000;
 /// Difference of the volumes of a component that two resolutions may show.
 const VOLUME_TOLERANCE: f64 = 0.05;
 
@@ -41,9 +43,10 @@ pub(crate) fn observe(
     params: &PolygonizeParams,
     doubtful: &[[Interval; 3]],
 ) -> Result<Complex, PolygonizeError> {
-    let mut coarse = at(ctx, grid, grid.longest().max(LEAST_CELLS), params)?;
+    let mut coarse = at(ctx, grid, grid.longest().max(LEAST_CELLS), params.max_cells)?;
+    let plain = MOST_DENSE_CELLS.max(2 * grid.longest());
     let many = if has_intervals(ctx, grid) { MOST_CELLS } else { MOST_DENSE_CELLS };
-    let most = many.max(2 * grid.longest()).min(Grid::most_cells(grid.levels));
+    let most = many.max(plain).min(Grid::most_cells(grid.levels));
     let mut rounds = 0;
     loop {
         rounds += 1;
@@ -53,7 +56,8 @@ pub(crate) fn observe(
         if 2 * cells > most {
             return Err(unresolved);
         }
-        let fine = match at(ctx, grid, 2 * cells, params) {
+        let few = if 2 * cells > plain { MOST_FEW_CELLS } else { u32::MAX };
+        let fine = match at(ctx, grid, 2 * cells, params.max_cells.min(few)) {
             Err(PolygonizeError::TooManyCells { .. }) => return Err(unresolved),
             found => found?,
         };
@@ -64,14 +68,9 @@ pub(crate) fn observe(
     }
 }
 
-fn at(
-    ctx: &Ctx<'_>,
-    grid: &Grid,
-    cells: u32,
-    params: &PolygonizeParams,
-) -> Result<Complex, PolygonizeError> {
+fn at(ctx: &Ctx<'_>, grid: &Grid, cells: u32, limit: u32) -> Result<Complex, PolygonizeError> {
     let grid = Grid::new(grid.domain, cells, grid.levels);
-    let cells = surface_cells(ctx, &grid, params.max_cells)?;
+    let cells = surface_cells(ctx, &grid, limit)?;
     Complex::new(ctx, grid, &cells)
 }
 
