@@ -120,7 +120,8 @@ fn formulas_with_a_caret_below_the_place() {
 
 #[test]
 fn a_long_formula_is_not_searched_for_ever_and_a_long_line_is_cut() {
-    let terms: String = (0..30_000).map(|k| format!("+0.0000001*(x - {k}.5)^2")).collect();
+    let terms: Vec<String> = (0..30_000).map(|k| format!("+0.0000001*(x - {k}.5)^2")).collect();
+    let terms = terms.concat();
     let sandbox = Sandbox::new();
     let write = |end: &str| {
         sandbox.write("long.toml", format!("[model]\nformula = \"x^2+y^2+z^2-1{terms}{end}\"\n"));

@@ -40,7 +40,8 @@ fn a_formula_may_begin_with_a_minus_and_be_small() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_the_program_while_no_stage_runs() {
-    let terms: String = (0..200_000).map(|k| format!("+0.0000001*sin({k}*x)")).collect();
+    let terms: Vec<String> = (0..200_000).map(|k| format!("+0.0000001*sin({k}*x)")).collect();
+    let terms = terms.concat();
     let sandbox = Sandbox::new();
     let text =
         format!("[model]\nformula = \"x^2+y^2+z^2-1{terms}\"\nbox = [[-2, 2], [-2, 2], [-2, 2]]\n");
