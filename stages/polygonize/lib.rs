@@ -176,7 +176,12 @@ fn triangulate(
     if sides_are_clear && failed.is_empty() {
         return Ok((extract(ctx, &complex)?, TopologyProof::Certified));
     }
-    let doubtful = lost_parts::boxes(&complex, &failed);
+    // Without interval arithmetic every box fails: there the samples alone decide.
+    let doubtful = if surface_cells::has_intervals(ctx, &grid) {
+        lost_parts::boxes(&complex, &failed)
+    } else {
+        Vec::new()
+    };
     let observed = observation::observe(ctx, &grid, params, &doubtful)?;
     lost_parts::none_is_lost(ctx, &observed, &doubtful)?;
     Ok((extract(ctx, &observed)?, TopologyProof::Observed))
