@@ -99,7 +99,7 @@ fn task(mesh: &BaseMeshView<'_>, vertices: Range<usize>) -> Task {
     }
 }
 
-/// Corner of the face left of `h` at the origin of `h`, and the same for the next spoke.
+/// Outgoing half-edges of a vertex, counter-clockwise.
 fn spokes(mesh: &BaseMeshView<'_>, vertex: usize) -> impl Iterator<Item = HalfEdge> {
     let rows = mesh.star_first[vertex] as usize..mesh.star_first[vertex + 1] as usize;
     let halves = mesh.star[rows].to_vec();

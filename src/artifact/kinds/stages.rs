@@ -15,10 +15,8 @@ artifact! {
 pub enum CurveStatus {
     /// The iteration converged with lengths in range.
     Converged,
-    /// The tangent lengths were clamped and the curve refitted.
+    /// The iteration found no sound curve: tangent lengths are from a table, `q2` refitted.
     Clamped,
-    /// No solution: a Hermite curve that meets the curvature conditions took its place.
-    Fallback,
 }
 
 impl CurveStatus {
@@ -27,7 +25,6 @@ impl CurveStatus {
         match self {
             Self::Converged => 0,
             Self::Clamped => 1,
-            Self::Fallback => 2,
         }
     }
 }
