@@ -6,7 +6,9 @@
 
 use crate::dag::{Dag, Node, NodeId};
 use crate::operation::{BinaryOp, UnaryOp};
-use BinaryOp::{Add, AngleSlope, Atan2, Div, GuardedPow, LessEqual, Max, Min, Mul, Pow, Sub};
+use BinaryOp::{
+    Add, AngleJump, AngleSlope, Atan2, Div, GuardedPow, LessEqual, Max, Min, Mul, Pow, PowJump, Sub,
+};
 
 /// The three first derivatives of `root`, appended to `dag`.
 pub(crate) fn gradient(dag: &mut Dag, root: NodeId) -> [NodeId; 3] {
@@ -161,7 +163,12 @@ impl Chain<'_> {
                 let slope = self.dag.binary(AngleSlope, a, b);
                 let (left, right) = (self.mul(b, da), self.mul(a, db));
                 let turn = self.sub(left, right);
-                self.mul(turn, slope)
+                let smooth = self.mul(turn, slope);
+                // The turn is 0 where a or b is, and yet the angle jumps as the other moves.
+                let jump = self.dag.binary(AngleJump, a, b);
+                let (by_a, by_b) = (self.mul(jump, da), self.mul(jump, db));
+                let jumps = self.add(by_a, by_b);
+                self.add(smooth, jumps)
             }
             AngleSlope => {
                 let (left, right) = (self.mul(a, da), self.mul(b, db));
@@ -170,7 +177,7 @@ impl Chain<'_> {
                 let factor = self.scale(-2.0, square);
                 self.mul(factor, half)
             }
-            LessEqual => self.zero,
+            AngleJump | PowJump | LessEqual => self.zero,
         }
     }
 
@@ -188,7 +195,10 @@ impl Chain<'_> {
         let logarithm = self.dag.unary(UnaryOp::GuardedLn, a);
         let growth = self.mul(id, logarithm);
         let by_exponent = self.mul(growth, db);
-        self.add(by_base, by_exponent)
+        let smooth = self.add(by_base, by_exponent);
+        let jump = self.dag.binary(PowJump, a, b);
+        let jump = self.mul(jump, db);
+        self.add(smooth, jump)
     }
 
     /// `smin = (a+b)/2 - k g(t)` with `t = (a-b)/k`, `g = |t|/2 + BlendGap(t)`; hence the weights

@@ -174,6 +174,8 @@ impl Interval {
                 _ => Self::ENTIRE,
             },
             BinaryOp::Atan2 => corners(op, a, b),
+            BinaryOp::AngleJump | BinaryOp::PowJump if crosses_cut(a, b) => Self::ENTIRE,
+            BinaryOp::AngleJump | BinaryOp::PowJump => Self::ZERO,
             BinaryOp::AngleSlope => Self::point(1.0) / (a.power(2) + b.power(2)),
             BinaryOp::LessEqual => Self {
                 lo: operation::less_equal(a.hi, b.lo),
@@ -192,6 +194,8 @@ impl Interval {
         }
         match exponent {
             Some(n) if n.fract() == 0.0 && a.lo < 0.0 => a.integer_pow(n),
+            // A negative zero to an odd negative power is -inf.
+            _ if a.lo == 0.0 && b.lo < 0.0 => Self::ENTIRE,
             _ if a.lo == 0.0 => Self { lo: 0.0, hi: f64::INFINITY },
             _ => Self::UNKNOWN,
         }
@@ -241,7 +245,7 @@ impl Interval {
 }
 
 /// Whether `y = a`, `x = b` holds the origin or a point of the negative x-axis, where the angle
-/// jumps by a turn (also by the sign of a zero y).
+/// jumps by a turn (also by the sign of a zero y), and where the power `a^b` leaves 0.
 fn crosses_cut(a: Interval, b: Interval) -> bool {
     a.may_be_zero() && b.lo <= 0.0
 }

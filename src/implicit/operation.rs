@@ -57,6 +57,11 @@ pub(crate) enum BinaryOp {
     Atan2,
     /// `1/(a^2+b^2)`, 0 at the origin: slope of `atan2`, unbounded over its branch cut.
     AngleSlope,
+    /// Jump of `atan2`: 0 at every point, unbounded over boxes that hold its branch cut.
+    AngleJump,
+    /// Jump of `pow` in the exponent: 0 at every point, unbounded over boxes that hold a zero base
+    /// with an exponent of 0 or less, where the power is 1 or infinite instead of 0.
+    PowJump,
     /// 1 where `a <= b`, else 0.
     LessEqual,
 }
@@ -107,6 +112,7 @@ impl BinaryOp {
             Self::GuardedPow => guarded_pow(a, b),
             Self::Atan2 => libm::atan2(a, b),
             Self::AngleSlope => unless_zero(a * a + b * b, 1.0 / (a * a + b * b)),
+            Self::AngleJump | Self::PowJump => 0.0,
             Self::LessEqual => less_equal(a, b),
         }
     }

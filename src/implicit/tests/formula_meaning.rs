@@ -146,6 +146,10 @@ fn enclosures_at_kinks_hold_both_sides() {
     assert_eq!(slope("min(x, 2*x)", 1.0, 2.0), Interval::point(1.0));
     assert_eq!(slope("floor(x)", -0.5, 0.5), Interval::ENTIRE);
     assert_eq!(slope("floor(x)", 0.25, 0.5), Interval::ZERO);
+    for jump in ["atan2(x, 0)", "atan2(0, x)", "atan2(0*z, x)", "0^x", "atan2(x, y)"] {
+        assert_eq!(slope(jump, -0.5, 0.5), Interval::ENTIRE, "{jump}");
+    }
+    assert_eq!(slope("atan2(0, x)", 0.5, 1.0), Interval::ZERO);
     assert_eq!(slope("sqrt(x)", 0.0, 4.0).hi, f64::INFINITY);
 }
 
