@@ -61,8 +61,8 @@ fn renamed(node: Node, ids: &[NodeId]) -> Node {
 
 fn lower_node(low: &mut Dag, node: Node, ids: &[NodeId]) -> NodeId {
     match renamed(node, ids) {
-        Node::Unary(UnaryOp::SignSlope | UnaryOp::FloorSlope, _) => low.constant(0.0),
-        Node::Binary(BinaryOp::AngleJump | BinaryOp::PowJump, ..) => low.constant(0.0),
+        Node::Unary(UnaryOp::SignSlope | UnaryOp::FloorSlope, _)
+        | Node::Binary(BinaryOp::AngleJump | BinaryOp::PowJump, ..) => low.constant(0.0),
         Node::Unary(op, a) => low.unary(op, a),
         Node::Binary(BinaryOp::Mul, a, b) => multiply(low, a, b),
         Node::Binary(op @ (BinaryOp::Add | BinaryOp::Sub), a, b) => low.binary(op, a, b),
