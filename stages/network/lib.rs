@@ -1,23 +1,21 @@
 //! Stage network: a quartic boundary curve for every edge of the base mesh.
 
-mod curve;
 mod error;
 mod params;
-mod samples;
 
-pub use curve::{Ends, Solution, fit_curve};
 pub use error::NetworkError;
 pub use params::{Method, NetworkParams};
 
 use isospline_artifact::kinds::{
     BaseMeshView, Bounds, CurvatureView, CurveFit, CurveStatus, Network,
 };
+use isospline_fitting::curve_samples::Samples;
+use isospline_fitting::paper_curve::{Ends, Solution, fit_curve};
 use isospline_fitting::projection::project_all;
 use isospline_geometry::Vec3;
 use isospline_implicit::Jet1;
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
-use samples::Samples;
 use std::ops::Range;
 
 /// Fits each edge by itself under the curvature conditions [TK, Eq. (9)].

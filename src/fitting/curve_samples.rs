@@ -19,7 +19,8 @@ impl Samples {
         Self { parameters, weights }
     }
 
-    /// Inner samples.
+    /// Number of inner samples.
+    #[expect(clippy::len_without_is_empty, reason = "there are always samples")]
     pub fn len(&self) -> usize {
         self.parameters.len()
     }

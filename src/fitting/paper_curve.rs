@@ -5,9 +5,9 @@
 //
 // symbols: x = (l, m, q2), q1 = l t0, q3 = q4 - m t1; k0, k1 normal curvatures times the chord
 
-use crate::samples::Samples;
+use crate::curve_samples::Samples;
+use crate::shape::apply;
 use isospline_artifact::kinds::CurveStatus;
-use isospline_fitting::shape::apply;
 use isospline_geometry::Vec3;
 use isospline_geometry::linear::solve;
 use isospline_implicit::SymMat3;
