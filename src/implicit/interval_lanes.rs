@@ -10,6 +10,7 @@
 )]
 #![expect(clippy::needless_bitwise_bool, reason = "lazy operators would be branches")]
 
+use crate::instruction_set;
 use crate::interval::{Interval, add_down, mul_down, mul_up};
 use crate::interval_evaluator::{enclose, step};
 use crate::operation::{BinaryOp, UnaryOp};
@@ -84,7 +85,7 @@ impl Lanes {
 
 #[cfg(target_arch = "x86_64")]
 fn run(instructions: &[Instruction], file: &mut [Lanes]) {
-    if std::arch::is_x86_feature_detected!("avx2") {
+    if instruction_set::has_avx2() {
         #[expect(unsafe_code, reason = "calls code compiled for AVX2: half the time of SSE2")]
         // SAFETY: the processor has AVX2, as checked in the line above.
         unsafe {

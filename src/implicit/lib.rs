@@ -3,7 +3,7 @@
 //! Text becomes tokens (`lexer`), a graph without equal nodes (`parser`, `dag`), derivatives
 //! in the same graph (`derivative`), elementary operations (`lowering`) and instructions on
 //! few registers (`tape`), which run over blocks of points (`evaluator`) or over boxes
-//! (`interval_evaluator`).
+//! (`interval_evaluator`). Model files of other programs become text (`foreign`).
 
 pub mod bounds;
 mod canonical;
@@ -12,10 +12,12 @@ mod dag;
 mod derivative;
 mod evaluator;
 pub mod field;
+pub mod foreign;
 pub mod formula;
 pub mod formula_error;
 pub mod functions;
 pub mod inside;
+mod instruction_set;
 pub mod interval;
 mod interval_evaluator;
 mod interval_functions;
@@ -29,8 +31,11 @@ mod tape;
 pub use bounds::{BoundsError, auto_box};
 pub use closure::ClosureField;
 pub use field::{Field, Jet1, Jet2, Oriented, SymMat3};
+pub use foreign::{ForeignError, ForeignErrorKind, ForeignFormat, ForeignModel};
 pub use formula::Formula;
 pub use formula_error::{FormulaError, FormulaErrorKind};
 pub use functions::{CONSTANTS, FUNCTIONS, Function, VARIABLES};
 pub use inside::{Inside, InsideError, Side, resolve_inside};
+#[doc(hidden)]
+pub use instruction_set::{has_avx2, use_plain_code};
 pub use interval::{Interval, IntervalJet};
