@@ -3,11 +3,12 @@
 #![expect(clippy::disallowed_methods, reason = "artifact files are opened here")]
 
 use crate::commit::{replace_file, sync_folder};
-use crate::store::{Frozen, Partial, Publish};
+use crate::store::{Log, Partial, Publish};
 use crate::{Bytes, Durability, Lock, Store, StoreError};
 use memmap2::Mmap;
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -15,6 +16,8 @@ use std::sync::Arc;
 pub const SUFFIX: &str = ".isos";
 /// Appended to the name of a file that is being written.
 const PARTIAL: &str = ".partial";
+/// Appended to its name for the journal of its rows.
+const JOURNAL: &str = ".journal";
 const LOCK: &str = ".lock";
 
 /// Artifacts of one model in one folder.
@@ -61,30 +64,64 @@ impl Store for FolderStore {
     }
 
     fn names(&self) -> Result<Vec<String>, StoreError> {
-        let failed = || StoreError::io("list", &self.folder);
-        let entries = match std::fs::read_dir(&self.folder) {
-            Ok(entries) => entries,
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(e) => return Err(failed()(e)),
-        };
-        let mut names = Vec::new();
-        for entry in entries {
-            let name = entry.map_err(failed())?.file_name();
-            names.extend(name.to_str().filter(|n| n.ends_with(SUFFIX)).map(str::to_owned));
-        }
-        names.sort();
-        Ok(names)
+        let all = self.entries()?.into_iter();
+        Ok(all.filter(|name| name.ends_with(SUFFIX)).collect())
     }
 
     fn create(&self, name: &str, length: u64) -> Result<Box<dyn Partial>, StoreError> {
-        let target = self.path(name);
-        let path = self.path(&format!("{name}{PARTIAL}"));
+        let path = self.draft(name, PARTIAL);
         let mut options = OpenOptions::new();
         let file = options.create(true).truncate(true).read(true).write(true).open(&path);
         let file = file.map_err(StoreError::io("create", &path))?;
-        let draft = Draft { path, target, durability: self.durability, kept: false };
-        set_aside(&file, length).map_err(StoreError::io("set aside space for", &draft.path))?;
-        Ok(Box::new(Growing { file, draft, map: None }))
+        let growing = self.growing(name, file);
+        set_aside(&growing.file, length).map_err(StoreError::io("set aside space for", path))?;
+        Ok(Box::new(growing))
+    }
+
+    fn reopen(&self, name: &str, length: u64) -> Result<Option<Box<dyn Partial>>, StoreError> {
+        let path = self.draft(name, PARTIAL);
+        let file = match OpenOptions::new().read(true).write(true).open(&path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(StoreError::io("open", path)(e)),
+        };
+        if file.metadata().map_err(StoreError::io("read", path))?.len() != length {
+            return Ok(None);
+        }
+        let mut growing = self.growing(name, file);
+        growing.draft.outlives = true;
+        Ok(Some(Box::new(growing)))
+    }
+
+    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        read_if_there(&self.draft(name, PARTIAL))
+    }
+
+    fn journal(&self, name: &str, keep: u64) -> Result<Box<dyn Log>, StoreError> {
+        let path = self.draft(name, JOURNAL);
+        let mut options = OpenOptions::new();
+        let file = options.create(true).append(true).open(&path);
+        let file = file.map_err(StoreError::io("open", &path))?;
+        file.set_len(keep).map_err(StoreError::io("cut", &path))?;
+        Ok(Box::new(Entries { file, path }))
+    }
+
+    fn read_journal(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        read_if_there(&self.draft(name, JOURNAL))
+    }
+
+    fn drafts(&self) -> Result<Vec<String>, StoreError> {
+        let name = |entry: String| {
+            let stem = entry.strip_suffix(PARTIAL).or_else(|| entry.strip_suffix(JOURNAL));
+            stem.filter(|stem| stem.ends_with(SUFFIX)).map(str::to_owned)
+        };
+        let names: BTreeSet<String> = self.entries()?.into_iter().filter_map(name).collect();
+        Ok(names.into_iter().collect())
+    }
+
+    fn discard(&self, name: &str) -> Result<(), StoreError> {
+        self.remove(&format!("{name}{JOURNAL}"))?;
+        self.remove(&format!("{name}{PARTIAL}"))
     }
 
     fn read(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
@@ -102,12 +139,7 @@ impl Store for FolderStore {
     }
 
     fn read_note(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
-        let path = self.path(name);
-        match std::fs::read(&path) {
-            Ok(bytes) => Ok(Some(bytes)),
-            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(StoreError::io("read", path)(e)),
-        }
+        read_if_there(&self.path(name))
     }
 
     fn remove(&self, name: &str) -> Result<(), StoreError> {
@@ -126,6 +158,48 @@ impl Store for FolderStore {
     }
 }
 
+impl FolderStore {
+    /// Names of all files, sorted; none if there is no folder.
+    fn entries(&self) -> Result<Vec<String>, StoreError> {
+        let failed = || StoreError::io("list", &self.folder);
+        let entries = match std::fs::read_dir(&self.folder) {
+            Ok(entries) => entries,
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(e) => return Err(failed()(e)),
+        };
+        let mut names = Vec::new();
+        for entry in entries {
+            let name = entry.map_err(failed())?.file_name();
+            names.extend(name.to_str().map(str::to_owned));
+        }
+        names.sort();
+        Ok(names)
+    }
+
+    fn draft(&self, name: &str, suffix: &str) -> PathBuf {
+        self.path(&format!("{name}{suffix}"))
+    }
+
+    fn growing(&self, name: &str, file: File) -> Growing {
+        let draft = Draft {
+            path: self.draft(name, PARTIAL),
+            journal: self.draft(name, JOURNAL),
+            target: self.path(name),
+            durability: self.durability,
+            outlives: false,
+        };
+        Growing { file, draft, map: None }
+    }
+}
+
+fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {
+    match std::fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(StoreError::io("read", path)(e)),
+    }
+}
+
 /// The lock is the open file: the system frees it when the process ends, however it ends.
 #[derive(Debug)]
 struct Held {
@@ -134,18 +208,32 @@ struct Held {
 
 impl Lock for Held {}
 
+#[derive(Debug)]
+struct Entries {
+    file: File,
+    path: PathBuf,
+}
+
+impl Log for Entries {
+    fn append(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
+        self.file.write_all(bytes).map_err(StoreError::io("write", &self.path))
+    }
+}
+
 /// Names of a file in the making; removes it if it is dropped before it got its final name.
 #[derive(Debug)]
 struct Draft {
     path: PathBuf,
+    journal: PathBuf,
     target: PathBuf,
     durability: Durability,
-    kept: bool,
+    /// Stays when dropped, or has its final name.
+    outlives: bool,
 }
 
 impl Drop for Draft {
     fn drop(&mut self) {
-        if !self.kept {
+        if !self.outlives {
             // What cannot be removed is overwritten by the next run and never taken for whole.
             let _ = std::fs::remove_file(&self.path);
         }
@@ -156,7 +244,7 @@ impl Drop for Draft {
 struct Growing {
     file: File,
     draft: Draft,
-    map: Option<Mapped>,
+    map: Option<Arc<Mapped>>,
 }
 
 impl Partial for Growing {
@@ -164,35 +252,33 @@ impl Partial for Growing {
         write_all_at(&self.file, bytes, offset).map_err(StoreError::io("write", &self.draft.path))
     }
 
-    fn bytes(&mut self) -> Result<&[u8], StoreError> {
-        if self.map.is_none() {
-            self.map = Some(map(&self.file, &self.draft.path)?);
-        }
-        Ok(self.map.as_ref().map_or(&[], Mapped::bytes))
+    fn shared(&mut self) -> Result<Arc<dyn Bytes>, StoreError> {
+        let map = match &self.map {
+            Some(map) => map,
+            None => self.map.insert(Arc::new(map(&self.file, &self.draft.path)?)),
+        };
+        Ok(Arc::clone(map) as Arc<dyn Bytes>)
     }
 
-    fn freeze(mut self: Box<Self>) -> Result<Frozen, StoreError> {
-        self.bytes()?;
-        let Self { file, draft, map } = *self;
-        let map = map.expect("invariant: mapped just now");
-        Ok(Frozen { bytes: Arc::new(map), publish: Box::new(Ready { file, draft }) })
+    fn outlive(&mut self) {
+        self.draft.outlives = true;
+    }
+
+    fn freeze(self: Box<Self>) -> Box<dyn Publish> {
+        self
     }
 }
 
-#[derive(Debug)]
-struct Ready {
-    file: File,
-    draft: Draft,
-}
-
-impl Publish for Ready {
+impl Publish for Growing {
     fn publish(mut self: Box<Self>) -> Result<(), StoreError> {
         if self.draft.durability == Durability::Durable {
             self.file.sync_all().map_err(StoreError::io("sync", &self.draft.path))?;
         }
         let renamed = std::fs::rename(&self.draft.path, &self.draft.target);
         renamed.map_err(StoreError::io("rename", &self.draft.path))?;
-        self.draft.kept = true;
+        self.draft.outlives = true;
+        // A journal without its file says nothing; the next run removes it.
+        let _ = std::fs::remove_file(&self.draft.journal);
         Ok(())
     }
 }
@@ -214,10 +300,13 @@ fn map(file: &File, path: &Path) -> Result<Mapped, StoreError> {
         return Ok(Mapped(None));
     }
     // SAFETY: a file with its final name is never written again, only replaced by rename, which
-    // leaves the mapped inode as it is. A partial file is written only through `Growing`, whose
-    // `bytes` borrows it for as long as the slice lives, and the model folder's lock keeps other
-    // processes away. Gain: rows are read from the page cache without a copy, and artifacts
-    // larger than memory can be used.
+    // leaves the mapped inode as it is. A partial file keeps its length, is written only through
+    // `Growing::write_at`, by one writer, and the model folder's lock keeps other processes away;
+    // of its rows a reader looks only at those whose writing happened before it was given them:
+    // the pipeline starts a task when the tasks that write the rows it names have reported, through
+    // a channel, that they did, and the contract suite of stages poisons all other rows. Every bit
+    // pattern is a valid row. Gain: rows are read from the page cache without a copy, a stage runs
+    // behind the one before it, and artifacts larger than memory can be used.
     let map = unsafe { Mmap::map(file) };
     map.map(|m| Mapped(Some(m))).map_err(StoreError::io("map", path))
 }

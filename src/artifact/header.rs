@@ -116,7 +116,8 @@ pub(crate) fn read_u64(bytes: &[u8], offset: usize) -> u64 {
     u64::from_le_bytes(field)
 }
 
-fn read_u32(bytes: &[u8], offset: usize) -> u32 {
+/// Little-endian number at `offset`, which must lie in `bytes`.
+pub(crate) fn read_u32(bytes: &[u8], offset: usize) -> u32 {
     u32::from_le_bytes(bytes[offset..offset + 4].try_into().expect("invariant: four bytes"))
 }
 

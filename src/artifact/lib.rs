@@ -3,11 +3,13 @@
 //! A stage's output is a file of fixed-size rows that is either whole or not there. The layout
 //! is owned by `FORMAT.md`; [`header`] and [`layout`] are its only implementation.
 
+mod cells;
 pub mod commit;
 pub mod container;
 pub mod error;
 pub mod folder;
 pub mod header;
+pub mod journal;
 pub mod key;
 pub mod kinds;
 pub mod layout;
@@ -21,8 +23,9 @@ pub use container::Container;
 pub use error::{Damage, StoreError};
 pub use folder::FolderStore;
 pub use header::Header;
+pub use journal::{Journal, JournalEntry, JournalHead, Recorded};
 pub use key::{Key, KeyHasher, content_key};
 pub use memory::MemoryStore;
 pub use rows::{Artifact, Count, Row, RowsError, Section, SectionSource, SectionSpec, View};
 pub use store::{Bytes, Durability, Lock, Store};
-pub use writer::{Identity, Sealed, Writer};
+pub use writer::{Hashed, Identity, Sealed, Unfinished, Writer};

@@ -1,8 +1,9 @@
 //! A store in memory: the same containers without files.
 
-use crate::store::{Frozen, Partial, Publish};
+use crate::cells::Cells;
+use crate::store::{Log, Partial, Publish};
 use crate::{Bytes, Lock, Store, StoreError};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Artifacts of this process alone; clones share them.
@@ -13,39 +14,12 @@ pub struct MemoryStore {
 
 #[derive(Debug, Default)]
 struct Shelf {
-    files: BTreeMap<String, Arc<Words>>,
+    files: BTreeMap<String, Arc<Cells>>,
+    /// Unfinished files; those of writers at work are taken out when the writer gives up.
+    partials: BTreeMap<String, Arc<Cells>>,
+    journals: BTreeMap<String, Vec<u8>>,
     notes: BTreeMap<String, Vec<u8>>,
     locked: bool,
-}
-
-/// Bytes in memory aligned to 8.
-#[derive(Clone, Debug)]
-pub struct Words {
-    words: Vec<u64>,
-    length: usize,
-}
-
-impl Words {
-    /// A copy of `bytes`.
-    pub fn copy_of(bytes: &[u8]) -> Self {
-        let mut out = Self::zeros(bytes.len());
-        out.bytes_mut().copy_from_slice(bytes);
-        out
-    }
-
-    fn zeros(length: usize) -> Self {
-        Self { words: vec![0; length.div_ceil(8)], length }
-    }
-
-    fn bytes_mut(&mut self) -> &mut [u8] {
-        &mut bytemuck::cast_slice_mut(&mut self.words)[..self.length]
-    }
-}
-
-impl Bytes for Words {
-    fn bytes(&self) -> &[u8] {
-        &bytemuck::cast_slice(&self.words)[..self.length]
-    }
 }
 
 impl MemoryStore {
@@ -56,7 +30,7 @@ impl MemoryStore {
 
     /// Puts a file of any bytes under `name`, as a disk could.
     pub fn put(&self, name: &str, bytes: &[u8]) {
-        self.shelf().files.insert(name.to_owned(), Arc::new(Words::copy_of(bytes)));
+        self.shelf().files.insert(name.to_owned(), Arc::new(Cells::copy_of(bytes)));
     }
 
     fn shelf(&self) -> MutexGuard<'_, Shelf> {
@@ -82,12 +56,43 @@ impl Store for MemoryStore {
     }
 
     fn create(&self, name: &str, length: u64) -> Result<Box<dyn Partial>, StoreError> {
-        let words = Words::zeros(length as usize);
-        Ok(Box::new(Growing { store: self.clone(), name: name.to_owned(), words }))
+        Ok(self.growing(name, Cells::zeros(length as usize), false))
+    }
+
+    fn reopen(&self, name: &str, length: u64) -> Result<Option<Box<dyn Partial>>, StoreError> {
+        // A copy: the writer that left the file may still be alive in this process.
+        let found = self.read_partial(name)?.filter(|bytes| bytes.len() as u64 == length);
+        Ok(found.map(|bytes| self.growing(name, Cells::copy_of(&bytes), true)))
+    }
+
+    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        Ok(self.shelf().partials.get(name).map(|cells| cells.bytes().to_vec()))
+    }
+
+    fn journal(&self, name: &str, keep: u64) -> Result<Box<dyn Log>, StoreError> {
+        self.shelf().journals.entry(name.to_owned()).or_default().truncate(keep as usize);
+        Ok(Box::new(Entries { store: self.clone(), name: name.to_owned() }))
+    }
+
+    fn read_journal(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        Ok(self.shelf().journals.get(name).cloned())
+    }
+
+    fn drafts(&self) -> Result<Vec<String>, StoreError> {
+        let shelf = self.shelf();
+        let names: BTreeSet<&String> = shelf.partials.keys().chain(shelf.journals.keys()).collect();
+        Ok(names.into_iter().cloned().collect())
+    }
+
+    fn discard(&self, name: &str) -> Result<(), StoreError> {
+        let mut shelf = self.shelf();
+        shelf.partials.remove(name);
+        shelf.journals.remove(name);
+        Ok(())
     }
 
     fn read(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
-        Ok(self.shelf().files.get(name).map(|words| Arc::clone(words) as Arc<dyn Bytes>))
+        Ok(self.shelf().files.get(name).map(|cells| Arc::clone(cells) as Arc<dyn Bytes>))
     }
 
     fn write_note(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
@@ -123,40 +128,72 @@ impl Drop for Held {
 }
 
 #[derive(Debug)]
-struct Growing {
+struct Entries {
     store: MemoryStore,
     name: String,
-    words: Words,
 }
 
-impl Partial for Growing {
-    fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), StoreError> {
-        let offset = offset as usize;
-        self.words.bytes_mut()[offset..offset + bytes.len()].copy_from_slice(bytes);
+impl Log for Entries {
+    fn append(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
+        // Gone if it was discarded, as an unlinked file would be.
+        if let Some(journal) = self.store.shelf().journals.get_mut(&self.name) {
+            journal.extend_from_slice(bytes);
+        }
         Ok(())
-    }
-
-    fn bytes(&mut self) -> Result<&[u8], StoreError> {
-        Ok(self.words.bytes())
-    }
-
-    fn freeze(self: Box<Self>) -> Result<Frozen, StoreError> {
-        let words = Arc::new(self.words);
-        let ready = Ready { store: self.store, name: self.name, words: Arc::clone(&words) };
-        Ok(Frozen { bytes: words, publish: Box::new(ready) })
     }
 }
 
 #[derive(Debug)]
-struct Ready {
+struct Growing {
     store: MemoryStore,
     name: String,
-    words: Arc<Words>,
+    cells: Arc<Cells>,
+    outlives: bool,
 }
 
-impl Publish for Ready {
-    fn publish(self: Box<Self>) -> Result<(), StoreError> {
-        self.store.shelf().files.insert(self.name, self.words);
+impl MemoryStore {
+    fn growing(&self, name: &str, cells: Cells, outlives: bool) -> Box<dyn Partial> {
+        let cells = Arc::new(cells);
+        self.shelf().partials.insert(name.to_owned(), Arc::clone(&cells));
+        Box::new(Growing { store: self.clone(), name: name.to_owned(), cells, outlives })
+    }
+}
+
+impl Partial for Growing {
+    fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), StoreError> {
+        self.cells.write_at(offset as usize, bytes);
         Ok(())
+    }
+
+    fn shared(&mut self) -> Result<Arc<dyn Bytes>, StoreError> {
+        Ok(Arc::clone(&self.cells) as Arc<dyn Bytes>)
+    }
+
+    fn outlive(&mut self) {
+        self.outlives = true;
+    }
+
+    fn freeze(self: Box<Self>) -> Box<dyn Publish> {
+        self
+    }
+}
+
+impl Publish for Growing {
+    fn publish(self: Box<Self>) -> Result<(), StoreError> {
+        let mut shelf = self.store.shelf();
+        shelf.files.insert(self.name.clone(), Arc::clone(&self.cells));
+        shelf.journals.remove(&self.name);
+        Ok(())
+    }
+}
+
+impl Drop for Growing {
+    fn drop(&mut self) {
+        let mut shelf = self.store.shelf();
+        let own = |found: &Arc<Cells>| Arc::ptr_eq(found, &self.cells);
+        let published = shelf.files.get(&self.name).is_some_and(own);
+        if (published || !self.outlives) && shelf.partials.get(&self.name).is_some_and(own) {
+            shelf.partials.remove(&self.name);
+        }
     }
 }

@@ -18,7 +18,10 @@ pub enum Durability {
     Fast,
 }
 
-/// A file's bytes, mapped or in memory; never changed while they are held.
+/// A file's bytes, mapped or in memory.
+///
+/// What was written before the bytes were asked for is never changed while they are held; of a
+/// file that is still being written, the rest may change under the reader and means nothing.
 pub trait Bytes: Send + Sync + Debug {
     /// All bytes, aligned to 8.
     fn bytes(&self) -> &[u8];
@@ -28,6 +31,8 @@ pub trait Bytes: Send + Sync + Debug {
 pub trait Lock: Send + Debug {}
 
 /// A file being written, of known length, not yet visible under its name.
+///
+/// Dropped, it leaves nothing behind unless it was told to [outlive](Partial::outlive) its writer.
 pub trait Partial: Send + Debug {
     /// Writes at an offset; pieces come in any order and never overlap.
     ///
@@ -35,33 +40,32 @@ pub trait Partial: Send + Debug {
     /// [`StoreError::Io`].
     fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), StoreError>;
 
-    /// All bytes as they stand.
+    /// All bytes, for readers in this process, now and while the writing goes on.
     ///
     /// # Errors
     /// [`StoreError::Io`].
-    fn bytes(&mut self) -> Result<&[u8], StoreError>;
+    fn shared(&mut self) -> Result<Arc<dyn Bytes>, StoreError>;
 
-    /// Ends the writing: the bytes for readers in this process, and the handle that makes them
-    /// visible to all others.
-    ///
-    /// # Errors
-    /// [`StoreError::Io`].
-    fn freeze(self: Box<Self>) -> Result<Frozen, StoreError>;
+    /// Lets the file stay if the writing is given up: its journal says what of it can be used.
+    fn outlive(&mut self);
+
+    /// Ends the writing: the handle that makes the file visible to all.
+    fn freeze(self: Box<Self>) -> Box<dyn Publish>;
 }
 
-/// A file that is whole: for readers in this process, and for all others.
-#[derive(Debug)]
-pub struct Frozen {
-    /// All bytes.
-    pub bytes: Arc<dyn Bytes>,
-    /// Makes the file visible.
-    pub publish: Box<dyn Publish>,
+/// A file to which entries are appended.
+pub trait Log: Send + Debug {
+    /// Adds bytes at the end.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    fn append(&mut self, bytes: &[u8]) -> Result<(), StoreError>;
 }
 
 /// A file that is whole but not yet visible.
 pub trait Publish: Send + Debug {
-    /// Syncs the file as the store's [`Durability`] asks and gives it its name; dropped instead,
-    /// it leaves nothing behind. Durable only after [`Store::sync_names`].
+    /// Syncs the file as the store's [`Durability`] asks, gives it its name and removes its
+    /// journal. Durable only after [`Store::sync_names`].
     ///
     /// # Errors
     /// [`StoreError::Io`].
@@ -90,6 +94,44 @@ pub trait Store: Send + Sync + Debug {
     /// # Errors
     /// [`StoreError::Io`], among others for a full disk.
     fn create(&self, name: &str, length: u64) -> Result<Box<dyn Partial>, StoreError>;
+
+    /// Goes on with the unfinished file that an earlier writer left under this name; `None` if
+    /// there is none, or one of another length.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    fn reopen(&self, name: &str, length: u64) -> Result<Option<Box<dyn Partial>>, StoreError>;
+
+    /// The bytes of an unfinished file as they stand, for looking at; `None` if there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError>;
+
+    /// Opens the journal of an unfinished file after its first `keep` bytes; makes one where
+    /// there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    fn journal(&self, name: &str, keep: u64) -> Result<Box<dyn Log>, StoreError>;
+
+    /// The journal of an unfinished file; `None` if there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    fn read_journal(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError>;
+
+    /// Names of artifacts of which there is an unfinished file or a journal, sorted.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    fn drafts(&self) -> Result<Vec<String>, StoreError>;
+
+    /// Removes the unfinished file of this name and its journal, where they are.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    fn discard(&self, name: &str) -> Result<(), StoreError>;
 
     /// The bytes of a whole file; `None` if there is none of that name.
     ///

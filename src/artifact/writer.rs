@@ -3,12 +3,15 @@
 use crate::container::block_checksums;
 use crate::header::{HEADER_LIMIT, Header, encode, encoded_size};
 use crate::layout::{Footer, Layout, place_sections};
-use crate::store::{Frozen, Partial, Publish};
-use crate::{Container, Key, Section, SectionSpec, Store, StoreError, content_key};
+use crate::store::{Partial, Publish};
+use crate::{
+    Bytes, Container, Key, Section, SectionSource, SectionSpec, Store, StoreError, content_key,
+};
+use std::ops::Range;
 use std::sync::Arc;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Everything that a header says of an artifact but its section table.
+/// What a header says of an artifact before its rows are made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// Kind of the artifact.
@@ -21,19 +24,33 @@ pub struct Identity {
     pub stage_version: u32,
     /// Key of stage, parameters, model and the recipes of the inputs.
     pub recipe: Key,
-    /// Key of stage, parameters, model and the contents of the inputs.
-    pub derivation: Key,
 }
 
 /// An artifact being written: rows come in any order, each once.
 #[derive(Debug)]
 pub struct Writer {
-    file: String,
     partial: Box<dyn Partial>,
-    header: Header,
-    encoded: Vec<u8>,
-    layout: Layout,
+    rows: Unfinished,
     written: Vec<u64>,
+}
+
+/// The rows of an artifact that is being written; those that are written can be read.
+#[derive(Clone, Debug)]
+pub struct Unfinished {
+    file: Arc<str>,
+    header: Arc<Header>,
+    layout: Arc<Layout>,
+    bytes: Arc<dyn Bytes>,
+}
+
+/// An artifact with all its rows, which lacks the keys of what it was made from.
+#[derive(Debug)]
+pub struct Hashed {
+    /// Key of the rows.
+    pub content: Key,
+    table: Vec<u8>,
+    partial: Box<dyn Partial>,
+    rows: Unfinished,
 }
 
 /// A whole artifact that others do not see yet.
@@ -58,15 +75,53 @@ impl Writer {
     ) -> Result<Self, StoreError> {
         let file = store.describe(name);
         let header = header_of(identity, specs, lengths);
-        let bytes = encoded_size(&header);
-        if bytes > HEADER_LIMIT {
-            return Err(StoreError::HeaderSize { file, bytes, limit: HEADER_LIMIT });
-        }
-        let encoded = encode(&header);
-        let layout = Layout::of(&header, encoded.len()).expect("invariant: placed just now");
+        let layout = layout_of(&file, &header)?;
         let mut partial = store.create(name, layout.length)?;
-        partial.write_at(0, &encoded)?;
-        Ok(Self { file, partial, written: vec![0; lengths.len()], header, encoded, layout })
+        partial.write_at(0, &encode(&header))?;
+        Self::over(file, header, layout, partial)
+    }
+
+    /// Goes on with what an earlier writer left of the same artifact; `None` if it left nothing
+    /// of this size. Which of the rows can be used is for the caller to know.
+    ///
+    /// # Errors
+    /// [`StoreError::HeaderSize`], [`StoreError::Io`].
+    pub fn reopen(
+        store: &dyn Store,
+        name: &str,
+        identity: &Identity,
+        specs: &[SectionSpec],
+        lengths: &[usize],
+    ) -> Result<Option<Self>, StoreError> {
+        let file = store.describe(name);
+        let header = header_of(identity, specs, lengths);
+        let layout = layout_of(&file, &header)?;
+        let Some(mut partial) = store.reopen(name, layout.length)? else { return Ok(None) };
+        partial.write_at(0, &encode(&header))?;
+        Self::over(file, header, layout, partial).map(Some)
+    }
+
+    fn over(
+        file: String,
+        header: Header,
+        layout: Layout,
+        mut partial: Box<dyn Partial>,
+    ) -> Result<Self, StoreError> {
+        let written = vec![0; header.sections.len()];
+        let (header, layout) = (Arc::new(header), Arc::new(layout));
+        let bytes = partial.shared()?;
+        let rows = Unfinished { file: file.into(), header, layout, bytes };
+        Ok(Self { partial, rows, written })
+    }
+
+    /// Lets the file stay if the writing is given up, for [`Writer::reopen`].
+    pub fn outlive(&mut self) {
+        self.partial.outlive();
+    }
+
+    /// The rows, of which those that are written can be read, now and while more are written.
+    pub fn rows(&self) -> &Unfinished {
+        &self.rows
     }
 
     /// Writes whole rows of the section at this place of the table, from `first` on.
@@ -79,13 +134,13 @@ impl Writer {
         first: u64,
         bytes: &[u8],
     ) -> Result<(), StoreError> {
-        let entry = &self.header.sections[section];
+        let entry = &self.rows.header.sections[section];
         let stride = entry.stride as usize;
         let rows = (bytes.len() / stride) as u64;
         let fits = first.checked_add(rows).is_some_and(|end| end <= entry.rows);
         if !fits || !bytes.len().is_multiple_of(stride) {
             let section = entry.name.clone();
-            let file = self.file.clone();
+            let file = self.rows.file.to_string();
             return Err(StoreError::OutOfSection { file, section, first, bytes: bytes.len() });
         }
         self.written[section] += rows;
@@ -95,29 +150,51 @@ impl Writer {
         self.partial.write_at(entry.offset + first * stride as u64, bytes)
     }
 
-    /// Ends the writing: hashes the rows, writes checksum table and footer.
+    /// Counts rows as written that an earlier writer wrote.
+    pub fn take_over(&mut self, section: usize, n_rows: u64) {
+        self.written[section] += n_rows;
+    }
+
+    /// Ends the writing of rows and hashes them.
     ///
     /// # Errors
-    /// [`StoreError::Unfinished`] if rows are missing, [`StoreError::Io`].
-    pub fn seal(mut self) -> Result<Sealed, StoreError> {
+    /// [`StoreError::Unfinished`] if rows are missing.
+    pub fn hash(self) -> Result<Hashed, StoreError> {
         self.check_all_rows_are_written()?;
-        let (content, table) = hash_rows(&self.header, &self.layout, self.partial.bytes()?);
-        let footer = Footer { content, table: xxh3_64(&table), header: xxh3_64(&self.encoded) };
-        let tail = [&table[..], &footer.encode()].concat();
-        self.partial.write_at(self.layout.table.start, &tail)?;
-        let Frozen { bytes, publish } = self.partial.freeze()?;
-        let container = Arc::new(Container::new(self.file, bytes)?);
-        Ok(Sealed { container, publish })
+        let Self { partial, rows, .. } = self;
+        let (content, table) = rows.hash();
+        Ok(Hashed { content, table, partial, rows })
     }
 
     fn check_all_rows_are_written(&self) -> Result<(), StoreError> {
-        for (section, &written) in self.header.sections.iter().zip(&self.written) {
+        for (section, &written) in self.rows.header.sections.iter().zip(&self.written) {
             if written != section.rows {
-                let (file, section, rows) = (self.file.clone(), section.name.clone(), section.rows);
+                let (section, rows) = (section.name.clone(), section.rows);
+                let file = self.rows.file.to_string();
                 return Err(StoreError::Unfinished { file, section, written, rows });
             }
         }
         Ok(())
+    }
+}
+
+impl Hashed {
+    /// Writes header, checksum table and footer; `derivation` is the key of stage, parameters,
+    /// model and the contents of the inputs.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn seal(mut self, derivation: Key) -> Result<Sealed, StoreError> {
+        let Unfinished { file, header, layout, bytes } = self.rows;
+        let encoded = encode(&Header { derivation, ..Header::clone(&header) });
+        self.partial.write_at(0, &encoded)?;
+        let (content, table) = (self.content, xxh3_64(&self.table));
+        let footer = Footer { content, table, header: xxh3_64(&encoded) };
+        let tail = [&self.table[..], &footer.encode()].concat();
+        self.partial.write_at(layout.table.start, &tail)?;
+        let publish = self.partial.freeze();
+        let container = Arc::new(Container::new(file.to_string(), bytes)?);
+        Ok(Sealed { container, publish })
     }
 }
 
@@ -131,6 +208,43 @@ impl Sealed {
     }
 }
 
+impl Unfinished {
+    /// The header, whose derivation is not known yet.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Bytes of rows of the section at this place of the table; `None` beyond its end.
+    pub fn bytes_of(&self, section: usize, rows: Range<usize>) -> Option<&[u8]> {
+        let stride = self.header.sections.get(section)?.stride as usize;
+        self.section_at(section).get(rows.start * stride..rows.end * stride)
+    }
+
+    fn section_at(&self, section: usize) -> &[u8] {
+        let range = &self.layout.sections[section];
+        &self.bytes.bytes()[range.start as usize..range.end as usize]
+    }
+
+    /// Content key and checksum table.
+    fn hash(&self) -> (Key, Vec<u8>) {
+        let sections = self.header.sections.iter().enumerate();
+        let named = sections.clone().map(|(k, s)| {
+            (s.name.as_str(), Section { stride: s.stride as usize, bytes: self.section_at(k) })
+        });
+        let content = content_key(named);
+        let checksums = sections.flat_map(|(k, s)| block_checksums(s, self.section_at(k)));
+        (content, checksums.flat_map(u64::to_le_bytes).collect())
+    }
+}
+
+impl SectionSource for Unfinished {
+    fn section(&self, name: &str) -> Option<Section<'_>> {
+        let found = self.header.sections.iter().position(|s| s.name == name)?;
+        let stride = self.header.sections[found].stride as usize;
+        Some(Section { stride, bytes: self.section_at(found) })
+    }
+}
+
 fn header_of(identity: &Identity, specs: &[SectionSpec], lengths: &[usize]) -> Header {
     let mut header = Header {
         kind: identity.kind.to_owned(),
@@ -138,26 +252,21 @@ fn header_of(identity: &Identity, specs: &[SectionSpec], lengths: &[usize]) -> H
         stage: identity.stage.clone(),
         stage_version: identity.stage_version,
         recipe: identity.recipe,
-        derivation: identity.derivation,
+        derivation: Key::default(),
         sections: Vec::new(),
     };
     place_sections(&mut header, specs, lengths);
     header
 }
 
-/// Content key and checksum table of the rows in `file`.
-fn hash_rows(header: &Header, layout: &Layout, file: &[u8]) -> (Key, Vec<u8>) {
-    let rows = |k: usize| {
-        let range = &layout.sections[k];
-        &file[range.start as usize..range.end as usize]
-    };
-    let sections = header.sections.iter().enumerate();
-    let named = sections
-        .clone()
-        .map(|(k, s)| (s.name.as_str(), Section { stride: s.stride as usize, bytes: rows(k) }));
-    let content = content_key(named);
-    let checksums = sections.flat_map(|(k, s)| block_checksums(s, rows(k)));
-    (content, checksums.flat_map(u64::to_le_bytes).collect())
+fn layout_of(file: &str, header: &Header) -> Result<Layout, StoreError> {
+    let bytes = encoded_size(header);
+    if bytes > HEADER_LIMIT {
+        let file = file.to_owned();
+        return Err(StoreError::HeaderSize { file, bytes, limit: HEADER_LIMIT });
+    }
+    let preamble = crate::header::PREAMBLE;
+    Ok(Layout::of(header, preamble + bytes).expect("invariant: placed just now"))
 }
 
 #[cfg(test)]
@@ -180,8 +289,13 @@ pub(crate) mod tests {
             stage: "make".to_owned(),
             stage_version: 1,
             recipe: Key([1; 32]),
-            derivation: Key([2; 32]),
         }
+    }
+
+    pub(crate) const DERIVATION: Key = Key([2; 32]);
+
+    fn sealed(writer: Writer) -> Sealed {
+        writer.hash().unwrap().seal(DERIVATION).unwrap()
     }
 
     pub(crate) fn write(store: &dyn Store, name: &str, identity: &Identity, rows: &Rows) -> Sealed {
@@ -190,7 +304,7 @@ pub(crate) mod tests {
         for (k, section) in rows.sections().into_iter().enumerate() {
             writer.write_rows(k, 0, section.bytes).unwrap();
         }
-        writer.seal().unwrap()
+        sealed(writer)
     }
 
     /// The artifact as the writer gives it, and its bytes.
@@ -213,9 +327,50 @@ pub(crate) mod tests {
         writer.write_rows(0, 4, bytemuck::cast_slice(&rows.twist[4..])).unwrap();
         writer.write_rows(2, 0, &rows.status[..3]).unwrap();
         writer.write_rows(0, 0, bytemuck::cast_slice(&rows.twist[..4])).unwrap();
-        writer.seal().unwrap().publish().unwrap();
+        sealed(writer).publish().unwrap();
         let bytes = store.read("a.isos").unwrap().unwrap();
         assert_eq!(bytes.bytes(), stored(&rows).1);
+    }
+
+    #[test]
+    fn rows_that_are_written_are_read_while_others_are_not() {
+        let rows = counting(5);
+        let store = MemoryStore::new();
+        let mut writer =
+            Writer::begin(&store, "a.isos", &identity(), Rows::SECTIONS, &[5, 0, 7]).unwrap();
+        let seen = writer.rows().clone();
+        let seen = Rows::open(&seen).unwrap();
+        assert_eq!(seen.twist.len(), 5);
+        writer.write_rows(0, 3, bytemuck::cast_slice(&rows.twist[3..])).unwrap();
+        let row = writer.rows().bytes_of(0, 3..4).unwrap();
+        assert_eq!(row, bytemuck::cast_slice::<_, u8>(&rows.twist[3..4]));
+        assert_eq!(writer.rows().bytes_of(0, 5..6), None);
+    }
+
+    #[test]
+    fn an_abandoned_file_is_taken_up_again_where_it_was_to_outlive_its_writer() {
+        let (rows, lengths) = (counting(5), [5, 0, 7]);
+        let store = MemoryStore::new();
+        let reopened = |store: &MemoryStore, lengths: &[usize]| {
+            Writer::reopen(store, "a.isos", &identity(), Rows::SECTIONS, lengths).unwrap()
+        };
+        for outlives in [false, true] {
+            let mut writer =
+                Writer::begin(&store, "a.isos", &identity(), Rows::SECTIONS, &lengths).unwrap();
+            writer.write_rows(2, 0, &rows.status).unwrap();
+            if outlives {
+                writer.outlive();
+            }
+            drop(writer);
+            assert_eq!(reopened(&store, &lengths).is_some(), outlives);
+        }
+        assert!(reopened(&store, &[6, 0, 7]).is_none(), "another size");
+        let mut writer = reopened(&store, &lengths).unwrap();
+        writer.take_over(2, 7);
+        writer.write_rows(0, 0, bytemuck::cast_slice(&rows.twist)).unwrap();
+        sealed(writer).publish().unwrap();
+        assert_eq!(store.read("a.isos").unwrap().unwrap().bytes(), stored(&rows).1);
+        assert_eq!(store.drafts().unwrap(), [""; 0]);
     }
 
     #[test]
@@ -262,7 +417,7 @@ pub(crate) mod tests {
         assert_eq!(beyond.to_string(), "a.isos: rows 3.. (2 bytes) do not fit section \"status\"");
         assert!(writer.write_rows(0, 0, &[0; 23]).is_err());
         writer.write_rows(2, 0, &[0; 4]).unwrap();
-        let unfinished = writer.seal().unwrap_err();
+        let unfinished = writer.hash().unwrap_err();
         assert_eq!(unfinished.to_string(), "a.isos: section \"twist\" has 0 of 2 rows");
         assert!(store.names().unwrap().is_empty());
     }

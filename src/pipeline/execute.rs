@@ -43,7 +43,8 @@ pub(crate) fn execute<'f>(
     let node = StageRun { frame, idx, identity: identity(&execution), crew };
     let made = node.make(Bundle(execution.inputs))?;
     let sealing = clock::now();
-    let sealed = made.writer.seal()?;
+    let derivation = frame.nodes[idx].derivation(execution.contents);
+    let sealed = made.writer.hash()?.seal(derivation.expect("invariant: inputs are there"))?;
     let resident = memory::resident();
     let cost = Cost {
         seconds: start.elapsed().as_secs_f64(),
@@ -235,14 +236,12 @@ impl Sink<'_, '_, '_> {
 
 fn identity(execution: &Execution<'_, '_>) -> Identity {
     let node = &execution.frame.nodes[execution.idx];
-    let derivation = node.derivation(execution.contents);
     Identity {
         kind: node.info.kind,
         schema: node.info.schema,
         stage: node.info.name.to_owned(),
         stage_version: node.info.version,
         recipe: node.recipe,
-        derivation: derivation.expect("invariant: inputs are there"),
     }
 }
 

@@ -1,6 +1,6 @@
 //! A store in memory whose k-th operation fails.
 
-use isospline_artifact::store::{Frozen, Partial, Publish};
+use isospline_artifact::store::{Log, Partial, Publish};
 use isospline_artifact::{Bytes, Lock, MemoryStore, Store, StoreError};
 use std::io;
 use std::sync::Arc;
@@ -34,6 +34,12 @@ impl FaultyStore {
     }
 }
 
+impl FaultyStore {
+    fn faulty<T: ?Sized>(&self, name: &str, inner: Box<T>) -> Faulty<T> {
+        Faulty { name: name.to_owned(), fuse: self.fuse.clone(), inner }
+    }
+}
+
 impl Store for FaultyStore {
     fn describe(&self, name: &str) -> String {
         self.inner.describe(name)
@@ -52,7 +58,39 @@ impl Store for FaultyStore {
     fn create(&self, name: &str, length: u64) -> Result<Box<dyn Partial>, StoreError> {
         self.fuse.burn("create", name)?;
         let inner = self.inner.create(name, length)?;
-        Ok(Box::new(Faulty { name: name.to_owned(), inner, fuse: self.fuse.clone() }))
+        Ok(Box::new(self.faulty(name, inner)))
+    }
+
+    fn reopen(&self, name: &str, length: u64) -> Result<Option<Box<dyn Partial>>, StoreError> {
+        self.fuse.burn("open", name)?;
+        let inner = self.inner.reopen(name, length)?;
+        Ok(inner.map(|inner| Box::new(self.faulty(name, inner)) as Box<dyn Partial>))
+    }
+
+    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        self.fuse.burn("read", name)?;
+        self.inner.read_partial(name)
+    }
+
+    fn journal(&self, name: &str, keep: u64) -> Result<Box<dyn Log>, StoreError> {
+        self.fuse.burn("open", name)?;
+        let inner = self.inner.journal(name, keep)?;
+        Ok(Box::new(self.faulty(name, inner)))
+    }
+
+    fn read_journal(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        self.fuse.burn("read", name)?;
+        self.inner.read_journal(name)
+    }
+
+    fn drafts(&self) -> Result<Vec<String>, StoreError> {
+        self.fuse.burn("list", "")?;
+        self.inner.drafts()
+    }
+
+    fn discard(&self, name: &str) -> Result<(), StoreError> {
+        self.fuse.burn("remove", name)?;
+        self.inner.discard(name)
     }
 
     fn read(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
@@ -94,16 +132,24 @@ impl Partial for Faulty<dyn Partial> {
         self.inner.write_at(offset, bytes)
     }
 
-    fn bytes(&mut self) -> Result<&[u8], StoreError> {
+    fn shared(&mut self) -> Result<Arc<dyn Bytes>, StoreError> {
         self.fuse.burn("map", &self.name)?;
-        self.inner.bytes()
+        self.inner.shared()
     }
 
-    fn freeze(self: Box<Self>) -> Result<Frozen, StoreError> {
-        self.fuse.burn("map", &self.name)?;
-        let Frozen { bytes, publish } = self.inner.freeze()?;
-        let publish = Box::new(Faulty { name: self.name, fuse: self.fuse, inner: publish });
-        Ok(Frozen { bytes, publish })
+    fn outlive(&mut self) {
+        self.inner.outlive();
+    }
+
+    fn freeze(self: Box<Self>) -> Box<dyn Publish> {
+        Box::new(Faulty { name: self.name, fuse: self.fuse, inner: self.inner.freeze() })
+    }
+}
+
+impl Log for Faulty<dyn Log> {
+    fn append(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
+        self.fuse.burn("write", &self.name)?;
+        self.inner.append(bytes)
     }
 }
 
