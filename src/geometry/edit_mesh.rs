@@ -98,9 +98,21 @@ impl EditMesh {
 
     /// One half-edge an edge, ascending: the lower of the two, or the only one at a border.
     pub fn edges(&self) -> impl Iterator<Item = HalfEdge> + '_ {
-        (0..self.opposite.len() as u32)
-            .map(HalfEdge)
-            .filter(|&h| self.is_face(h.face()) && h.0 < self.opposite[h.row()])
+        // Half-edges of removed faces have the opposite 0.
+        (0..self.opposite.len() as u32).map(HalfEdge).filter(|&h| h.0 < self.opposite[h.row()])
+    }
+
+    /// [`Self::edges`] as a list. Every other half-edge passes, and which is random: without a
+    /// branch that costs a fifth of the time.
+    pub fn edge_list(&self) -> Vec<HalfEdge> {
+        let mut edges = vec![HalfEdge(0); self.opposite.len() + 1];
+        let mut n_edges = 0;
+        for (h, &opposite) in (0u32..).zip(&self.opposite) {
+            edges[n_edges] = HalfEdge(h);
+            n_edges += usize::from(h < opposite);
+        }
+        edges.truncate(n_edges);
+        edges
     }
 
     /// Whether the face has not been removed.

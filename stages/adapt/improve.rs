@@ -5,9 +5,10 @@ use crate::curve_error::curve_errors;
 use crate::error_cache::{EdgeError, ErrorCache};
 use crate::gate::{Gate, quality};
 use crate::surface_mesh::SurfaceMesh;
-use crate::vertex::{Vertex, feet};
+use crate::vertex::Vertex;
 use isospline_geometry::HalfEdge;
-use isospline_stage::{Counters, Ctx, Stopped};
+use isospline_stage::{Counters, Ctx, Serial, Stopped, map};
+use std::cmp::Ordering;
 
 /// A flip must make the curve of the edge this many times better.
 const FLIP_GAIN: f64 = 1.2;
@@ -21,44 +22,50 @@ const COLLAPSE_BELOW: f64 = 0.7;
 const ROOM: f64 = 0.85;
 /// Rounds without a better mesh before giving up.
 const PATIENCE: u32 = 2;
+/// Candidates judged in a task, of some ten curves each.
+const CANDIDATES_A_TASK: usize = 32;
 
 /// Flips, collapses where curves are good and splits where they are bad; keeps the best round.
 pub(crate) fn improve(
     ctx: &Ctx<'_>,
     surface: &mut SurfaceMesh<'_>,
-    params: &AdaptParams,
-    n_faces: usize,
+    (params, n_faces): (&AdaptParams, usize),
+    cache: &mut ErrorCache,
     counters: &mut Counters,
 ) -> Result<(), Stopped> {
     let gate = Gate::new(params);
     let mut best = surface.clone();
-    let (mut cache, mut diagonals) = (ErrorCache::default(), ErrorCache::default());
-    let mut best_score = Score::of(&cache.edges(surface));
+    let mut errors = cache.edges(surface);
+    let mut best_score = Score::of(&errors);
     let mut failures = 0;
     let mut edits = Counters::default();
     for round in 0..params.improve_rounds {
         ctx.host.progress(u64::from(round), u64::from(params.improve_rounds))?;
-        edits.count(
-            "edges_flipped_for_error",
-            flip_round(surface, &gate, (&mut cache, &mut diagonals)),
-        );
-        let errors = cache.edges(surface);
+        let flipped = flip_round(surface, &gate, &errors, &cache.diagonals(surface));
+        if flipped > 0 {
+            errors = cache.edges(surface);
+        }
         let (limit, n_splits) = split_limit(&errors);
         let excess = surface.mesh.face_count().saturating_sub(n_faces) / 2;
         let wanted = n_splits + excess;
         let collapsed = collapse_round(surface, &gate, &errors, (COLLAPSE_BELOW * limit, wanted));
+        if collapsed > 0 {
+            errors = cache.edges(surface);
+        }
         let room = n_faces.saturating_sub(surface.mesh.face_count()) / 2;
-        let split = split_round(surface, &gate, cache.edges(surface), room);
+        let split = split_round(surface, &gate, errors, room);
+        edits.count("edges_flipped_for_error", flipped);
         edits.count("vertices_collapsed_for_error", collapsed);
         edits.count("edges_split_for_error", split);
-        let score = Score::of(&cache.edges(surface));
+        errors = cache.edges(surface);
+        let score = Score::of(&errors);
         if score < best_score && surface.mesh.face_count() <= n_faces.max(best.mesh.face_count()) {
             (best, best_score, failures) = (surface.clone(), score, 0);
             counters.merge(&std::mem::take(&mut edits));
         } else {
             failures += 1;
         }
-        if failures > PATIENCE {
+        if failures > PATIENCE || flipped + collapsed + split == 0 {
             break;
         }
     }
@@ -69,13 +76,12 @@ pub(crate) fn improve(
 /// Collapses where the curves stay best until at most `n_faces` are left or nothing can go.
 pub(crate) fn trim(
     surface: &mut SurfaceMesh<'_>,
-    params: &AdaptParams,
-    n_faces: usize,
+    (params, n_faces): (&AdaptParams, usize),
+    cache: &mut ErrorCache,
     counters: &mut Counters,
 ) {
     let gate = Gate::new(params);
     // From collapses that nobody sees to any that the gate bears.
-    let mut cache = ErrorCache::default();
     for part in [0.25, 0.5, 1.0, 4.0, f64::INFINITY] {
         loop {
             let excess = surface.mesh.face_count().saturating_sub(n_faces).div_ceil(2);
@@ -94,8 +100,8 @@ pub(crate) fn trim(
 }
 
 /// Largest error of an edge curve, times the diagonal.
-pub(crate) fn worst_curve_error_rel(surface: &SurfaceMesh<'_>) -> f64 {
-    worst(&ErrorCache::default().edges(surface)) / surface.diagonal
+pub(crate) fn worst_curve_error_rel(surface: &SurfaceMesh<'_>, cache: &mut ErrorCache) -> f64 {
+    worst(&cache.edges(surface)) / surface.diagonal
 }
 
 fn worst(errors: &[EdgeError]) -> f64 {
@@ -118,21 +124,22 @@ impl Score {
 
 /// The error above which edges are split, and how many they are.
 fn split_limit(errors: &[EdgeError]) -> (f64, usize) {
-    let mut sorted: Vec<f64> = errors.iter().map(|&(_, e)| e).collect();
-    sorted.sort_by(|x, y| y.total_cmp(x));
-    let most = ((SPLIT_SHARE * sorted.len() as f64) as usize).clamp(1, sorted.len());
-    let limit = sorted[most - 1].max(SPLIT_ABOVE * sorted[0]);
-    (limit, sorted.iter().filter(|&&e| e >= limit).count())
+    let mut errors: Vec<f64> = errors.iter().map(|&(_, e)| e).collect();
+    let most = ((SPLIT_SHARE * errors.len() as f64) as usize).clamp(1, errors.len());
+    let (worse, &mut last, _) = errors.select_nth_unstable_by(most - 1, |x, y| y.total_cmp(x));
+    let worst = worse.iter().copied().fold(last, f64::max);
+    let limit = last.max(SPLIT_ABOVE * worst);
+    (limit, errors.iter().filter(|&&e| e >= limit).count())
 }
 
 /// Turns edges whose other diagonal has the better curve; worst first.
 fn flip_round(
     surface: &mut SurfaceMesh<'_>,
     gate: &Gate,
-    (cache, diagonals): (&mut ErrorCache, &mut ErrorCache),
+    errors: &[EdgeError],
+    others: &[EdgeError],
 ) -> u64 {
-    let (errors, others) = (cache.edges(surface), diagonals.diagonals(surface));
-    let pairs = errors.iter().zip(&others);
+    let pairs = errors.iter().zip(others);
     let gains = pairs.filter(|((_, now), (_, then))| FLIP_GAIN * then < *now);
     let mut gains: Vec<EdgeError> = gains.map(|(&edge, _)| edge).collect();
     gains.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
@@ -174,23 +181,7 @@ fn collapse_round(
     (limit, n_wanted): (f64, usize),
 ) -> u64 {
     let candidates = collapse_candidates(surface, gate, errors, (limit, n_wanted));
-    let rings: Vec<Vec<Vertex>> = candidates
-        .iter()
-        .map(|&(h, _)| ring(surface, h).map(|v| *surface.at(v)).collect())
-        .collect();
-    let spokes: Vec<[&Vertex; 2]> = candidates
-        .iter()
-        .zip(&rings)
-        .flat_map(|((_, merged), ring)| ring.iter().map(move |v| [merged, v]))
-        .collect();
-    let new_errors = curve_errors(surface.field, &spokes);
-    let mut rest = new_errors.as_slice();
-    let mut order = Vec::with_capacity(candidates.len());
-    for (k, ring) in rings.iter().enumerate() {
-        let (own, others) = rest.split_at(ring.len());
-        rest = others;
-        order.push((own.iter().copied().fold(0.0, f64::max), k));
-    }
+    let mut order: Vec<(f64, usize)> = merged_errors(surface, &candidates);
     order.retain(|&(e, _)| e < limit || limit == f64::INFINITY);
     order.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
     let mut touched = vec![false; surface.mesh.vertex_rows()];
@@ -217,6 +208,26 @@ fn collapse_round(
     n_collapsed
 }
 
+/// For each candidate the largest error of the curves that merging gives, and its place.
+fn merged_errors(
+    surface: &SurfaceMesh<'_>,
+    candidates: &[(HalfEdge, Vertex)],
+) -> Vec<(f64, usize)> {
+    let tasks: Vec<_> = candidates.chunks(CANDIDATES_A_TASK).collect();
+    let errors = map(surface.host, tasks.len(), |task| {
+        let mut first = vec![0];
+        let mut spokes: Vec<[&Vertex; 2]> = Vec::new();
+        for (h, merged) in tasks[task] {
+            spokes.extend(ring(surface, *h).map(|v| [merged, surface.at(v)]));
+            first.push(spokes.len());
+        }
+        let errors = curve_errors(surface.field, &Serial, &spokes);
+        let own = first.windows(2).map(|w| &errors[w[0]..w[1]]);
+        own.map(|own| own.iter().copied().fold(0.0, f64::max)).collect::<Vec<f64>>()
+    });
+    errors.concat().into_iter().zip(0..).collect()
+}
+
 /// Edges in the quietest places whose merging the gate bears, with the merged vertex.
 fn collapse_candidates(
     surface: &mut SurfaceMesh<'_>,
@@ -234,13 +245,12 @@ fn collapse_candidates(
         let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
         around[ends[0] as usize].max(around[ends[1] as usize])
     };
-    let mut quiet: Vec<EdgeError> = errors.iter().map(|&(h, _)| (h, score(h))).collect();
-    quiet.retain(|&(_, e)| e < limit);
-    quiet.sort_by(|x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
+    let quiet: Vec<EdgeError> =
+        errors.iter().map(|&(h, _)| (h, score(h))).filter(|&(_, e)| e < limit).collect();
     // Neighbours exclude each other and the gate refuses some: look at more than are wanted.
-    quiet.truncate(12 * n_wanted + 64);
+    let quiet = first_by(quiet, 12 * n_wanted + 64, |x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
     let middles: Vec<_> = quiet.iter().map(|&(h, _)| surface.middle(h)).collect();
-    let merged = feet(surface.field, surface.diagonal, &middles);
+    let merged = surface.feet(&middles);
     let mut candidates = Vec::new();
     for (&(h, _), merged) in quiet.iter().zip(&merged) {
         let Some(merged) = merged else { continue };
@@ -249,6 +259,20 @@ fn collapse_candidates(
         }
     }
     candidates
+}
+
+/// The first `n` in order, sorted: most of a large mesh is never looked at.
+fn first_by(
+    mut edges: Vec<EdgeError>,
+    n: usize,
+    order: impl Fn(&EdgeError, &EdgeError) -> Ordering,
+) -> Vec<EdgeError> {
+    if n < edges.len() {
+        edges.select_nth_unstable_by(n, &order);
+        edges.truncate(n);
+    }
+    edges.sort_unstable_by(order);
+    edges
 }
 
 /// The vertices about an edge: the neighbours of its ends without the ends; wings come twice.
@@ -261,13 +285,12 @@ fn ring<'s>(surface: &'s SurfaceMesh<'_>, h: HalfEdge) -> impl Iterator<Item = u
 fn split_round(
     surface: &mut SurfaceMesh<'_>,
     gate: &Gate,
-    mut bad: Vec<EdgeError>,
+    errors: Vec<EdgeError>,
     n_room: usize,
 ) -> u64 {
-    bad.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
-    bad.truncate(12 * n_room);
+    let bad = first_by(errors, 12 * n_room, |x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
     let middles: Vec<_> = bad.iter().map(|&(h, _)| surface.middle(h)).collect();
-    let middles = feet(surface.field, surface.diagonal, &middles);
+    let middles = surface.feet(&middles);
     let mut touched = vec![false; surface.mesh.vertex_rows()];
     let mut n_split = 0;
     for (&(h, _), middle) in bad.iter().zip(&middles) {

@@ -20,6 +20,7 @@ mod vertex;
 pub use error::AdaptError;
 pub use params::{AdaptParams, Improve};
 
+use error_cache::ErrorCache;
 use isospline_artifact::kinds::{BaseMesh, MeshView, TopologyProof};
 use isospline_geometry::TriangleMesh;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
@@ -33,7 +34,7 @@ pub struct Adapt {
 
 impl Stage for Adapt {
     const NAME: &'static str = "adapt";
-    const VERSION: u32 = 2;
+    const VERSION: u32 = 3;
     type Params = AdaptParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();
@@ -81,17 +82,20 @@ impl Adapt {
         counters: &mut Counters,
     ) -> Result<TriangleMesh, AdaptError> {
         let n_faces = mesh.faces.len();
-        let mut surface = SurfaceMesh::new(ctx.field, mesh)?;
-        counters.max("curve_error_rel_in", improve::worst_curve_error_rel(&surface));
+        let mut surface = SurfaceMesh::new(ctx, mesh)?;
+        let mut cache = ErrorCache::default();
+        let error_in = improve::worst_curve_error_rel(&surface, &mut cache);
+        counters.max("curve_error_rel_in", error_in);
         if improving {
             repair::soften(&mut surface, &self.params, counters);
         }
         repair::make_fit(ctx, &mut surface, &self.params, counters)?;
-        improve::trim(&mut surface, &self.params, n_faces, counters);
+        let goal = (&self.params, n_faces);
+        improve::trim(&mut surface, goal, &mut cache, counters);
         if improving {
-            improve::improve(ctx, &mut surface, &self.params, n_faces, counters)?;
+            improve::improve(ctx, &mut surface, goal, &mut cache, counters)?;
         }
-        counters.max("curve_error_rel", improve::worst_curve_error_rel(&surface));
+        counters.max("curve_error_rel", improve::worst_curve_error_rel(&surface, &mut cache));
         Ok(surface.mesh.compact())
     }
 }

@@ -4,7 +4,7 @@ use crate::gate::{Gate, slope, turning_deg};
 use crate::surface_mesh::SurfaceMesh;
 use crate::{AdaptError, AdaptParams};
 use isospline_geometry::{HalfEdge, Vec3};
-use isospline_stage::{Counters, Ctx};
+use isospline_stage::{Counters, Ctx, map};
 
 /// An edit must leave at most this part of the badness, or no unfit face: smaller gains would let
 /// edits chase each other.
@@ -21,6 +21,8 @@ const GROWTH: usize = 4;
 const GROWTH_FLOOR: usize = 4000;
 /// Rounds of the soft repair: what two passes of flips and slides do not mend, they never do.
 const SOFT_ROUNDS: u32 = 3;
+/// Faces judged in a task.
+const FACES_A_TASK: usize = 2048;
 
 /// Makes every face fit, by flips, slides and collapses where they help and by splits where not.
 ///
@@ -50,7 +52,7 @@ pub(crate) fn make_fit(
         for &face in &unfit {
             let still =
                 |s: &SurfaceMesh<'_>| s.mesh.is_face(face) && gate.face(&s.corners(face)) > 1.0;
-            if still(surface) && !mend(surface, &gate, face, counters) {
+            if still(surface) && mend(surface, &gate, face, counters).is_none() {
                 split(surface, &gate, face, &mut split_near, counters);
             }
         }
@@ -65,10 +67,21 @@ pub(crate) fn make_fit(
 pub(crate) fn soften(surface: &mut SurfaceMesh<'_>, params: &AdaptParams, counters: &mut Counters) {
     let gate = Gate::new(params);
     let cost = |s: &SurfaceMesh<'_>, f: u32| gate.face_with_quality(&s.corners(f));
+    // What no edit mended stays so until something near it changes.
+    let mut changed = vec![true; surface.mesh.vertex_rows()];
     for _ in 0..SOFT_ROUNDS {
+        let before = std::mem::replace(&mut changed, vec![false; surface.mesh.vertex_rows()]);
         for face in faces_above(surface, cost, SOFT) {
-            if surface.mesh.is_face(face) && cost(surface, face) > SOFT {
-                mend(surface, &gate, face, counters);
+            if !surface.mesh.is_face(face) || cost(surface, face) <= SOFT {
+                continue;
+            }
+            let is_new = |&v: &u32| before[v as usize] || changed[v as usize];
+            if !surface.mesh.face(face).iter().any(is_new) {
+                continue;
+            }
+            if let Some(center) = mend(surface, &gate, face, counters) {
+                changed[center as usize] = true;
+                surface.mesh.neighbours(center).for_each(|v| changed[v as usize] = true);
             }
         }
     }
@@ -77,35 +90,46 @@ pub(crate) fn soften(surface: &mut SurfaceMesh<'_>, params: &AdaptParams, counte
 /// Faces above a limit, worst first.
 fn faces_above(
     surface: &SurfaceMesh<'_>,
-    cost: impl Fn(&SurfaceMesh<'_>, u32) -> f64,
+    cost: impl Fn(&SurfaceMesh<'_>, u32) -> f64 + Sync,
     limit: f64,
 ) -> Vec<u32> {
-    let faces = surface.mesh.live_faces().map(|f| (cost(surface, f), f));
-    let mut above: Vec<(f64, u32)> = faces.filter(|&(c, _)| c > limit).collect();
+    let rows = surface.mesh.face_rows();
+    let mut above: Vec<(f64, u32)> = map(surface.host, rows.div_ceil(FACES_A_TASK), |task| {
+        let last = ((task + 1) * FACES_A_TASK).min(rows);
+        let faces = (task * FACES_A_TASK..last).map(|f| f as u32);
+        let costs = faces.filter(|&f| surface.mesh.is_face(f)).map(|f| (cost(surface, f), f));
+        costs.filter(|&(c, _)| c > limit).collect::<Vec<_>>()
+    })
+    .concat();
     above.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
     above.into_iter().map(|(_, f)| f).collect()
 }
 
-/// One edit that makes the face better without adding faces.
-fn mend(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32, counters: &mut Counters) -> bool {
-    if flip(surface, gate, face) {
-        counters.repair("edges_flipped", 1);
-    } else if slide(surface, gate, face) {
-        counters.repair("vertices_slid", 1);
-    } else if collapse(surface, gate, face) {
-        counters.repair("vertices_collapsed", 1);
-    } else {
-        return false;
-    }
-    true
+/// One edit that makes the face better without adding faces; the vertex in the middle of it.
+fn mend(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    face: u32,
+    counters: &mut Counters,
+) -> Option<u32> {
+    let edits: [(&str, Edit); 3] =
+        [("edges_flipped", flip), ("vertices_slid", slide), ("vertices_collapsed", collapse)];
+    edits.into_iter().find_map(|(name, edit)| {
+        let center = edit(surface, gate, face)?;
+        counters.repair(name, 1);
+        Some(center)
+    })
 }
+
+/// An edit about a face, if one helps: a vertex whose neighbours include all that it touches.
+type Edit = fn(&mut SurfaceMesh<'_>, &Gate, u32) -> Option<u32>;
 
 fn halves(face: u32) -> [HalfEdge; 3] {
     [0, 1, 2].map(|k| HalfEdge::new(face, k))
 }
 
 /// The flip that leaves the best faces.
-fn flip(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> bool {
+fn flip(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
     let mut best: Option<(f64, HalfEdge)> = None;
     for h in halves(face) {
         let Some([before, after]) = surface.flip_cost(gate, h) else { continue };
@@ -113,53 +137,57 @@ fn flip(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> bool {
             best = Some((after, h));
         }
     }
-    let Some((_, h)) = best else { return false };
-    surface.mesh.flip(h);
-    true
+    let turned = surface.mesh.flip(best?.1);
+    Some(surface.mesh.origin(turned))
 }
 
 /// Moves a corner towards the middle of its neighbours, along the surface.
-fn slide(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> bool {
-    for v in surface.mesh.face(face) {
-        let before = surface.fan_cost(gate, v);
+fn slide(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
+    const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
+    let corners = surface.mesh.face(face);
+    let steps = corners.map(|v| {
         let (n, sum) = surface
             .mesh
             .neighbours(v)
             .fold((0.0, Vec3::zeros()), |(n, sum), w| (n + 1.0, sum + surface.at(w).position));
-        let step = sum / n - surface.at(v).position;
-        for part in [1.0, 0.5, 0.25] {
-            let target = surface.at(v).position + part * step;
-            let Some(moved) = surface.foot(target, step.norm()) else { continue };
-            if surface.move_cost(gate, v, &moved) < GAIN * before {
-                surface.place(v, moved);
-                return true;
-            }
+        sum / n - surface.at(v).position
+    });
+    let target = |i: usize| surface.at(corners[i / 3]).position + PARTS[i % 3] * steps[i / 3];
+    let reach = |i: usize| steps[i / 3].norm();
+    let before = corners.map(|v| surface.fan_cost(gate, v));
+    let feet: [_; 9] = surface.feet_within(std::array::from_fn(target), std::array::from_fn(reach));
+    for (i, moved) in feet.into_iter().enumerate() {
+        let (v, Some(moved)) = (corners[i / 3], moved) else { continue };
+        if surface.move_cost(gate, v, &moved) < GAIN * before[i / 3] {
+            surface.place(v, moved);
+            return Some(v);
         }
     }
-    false
+    None
 }
 
 /// Merges the ends of an edge, shortest first, if the faces left are fit and better.
-fn collapse(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> bool {
+fn collapse(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
     let mut sides = halves(face).map(|h| {
         let [p, q] = surface.ends(h);
         ((q.position - p.position).norm(), h)
     });
     sides.sort_by(|x, y| x.0.total_cmp(&y.0));
-    for (length, h) in sides {
+    let middles = surface.feet_within(sides.map(|(_, h)| surface.middle(h)), sides.map(|s| s.0));
+    for ((_, h), middle) in sides.into_iter().zip(middles) {
         let ends = surface.ends(h).map(|v| *v);
         let before =
             [surface.mesh.origin(h), surface.mesh.target(h)].map(|v| surface.fan_cost(gate, v));
         let limit = (GAIN * before[0].max(before[1])).min(SOFT);
-        let middle = surface.foot(surface.middle(h), length);
         for merged in middle.into_iter().chain(ends) {
             if surface.collapse_cost(gate, h, &merged).is_some_and(|after| after < limit) {
+                let kept = surface.mesh.origin(h);
                 surface.collapse(h, merged);
-                return true;
+                return Some(kept);
             }
         }
     }
-    false
+    None
 }
 
 /// Splits the worst edge of the face at its middle, unless a corner has a new edge already.
@@ -183,7 +211,7 @@ fn split(
     if around.iter().any(|&v| split_near.get(v as usize).copied().unwrap_or(true)) {
         return;
     }
-    let Some(middle) = surface.foot(surface.middle(h), length) else { return };
+    let [Some(middle)] = surface.feet_within([surface.middle(h)], [length]) else { return };
     // Where the surface folds away below an edge the foot falls to an end: halves no shorter.
     let ends = surface.ends(h).map(|v| (v.position - middle.position).norm());
     if ends.iter().any(|&half| half < SHORTEST_HALF * length) {

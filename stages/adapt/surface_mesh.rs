@@ -8,11 +8,13 @@ use crate::gate::Gate;
 use crate::vertex::{Vertex, feet, vertices_at};
 use isospline_geometry::{EditMesh, HalfEdge, TriangleMesh, Vec3};
 use isospline_implicit::Field;
+use isospline_stage::{Ctx, Host};
 
 /// A mesh on a surface.
 #[derive(Clone)]
 pub(crate) struct SurfaceMesh<'a> {
     pub(crate) field: &'a dyn Field,
+    pub(crate) host: &'a dyn Host,
     /// Diagonal of the bounding box of the input: the unit of relative lengths.
     pub(crate) diagonal: f64,
     pub(crate) mesh: EditMesh,
@@ -22,11 +24,12 @@ pub(crate) struct SurfaceMesh<'a> {
 }
 
 impl<'a> SurfaceMesh<'a> {
-    pub(crate) fn new(field: &'a dyn Field, mesh: TriangleMesh) -> Result<Self, AdaptError> {
+    pub(crate) fn new(ctx: &Ctx<'a>, mesh: TriangleMesh) -> Result<Self, AdaptError> {
+        let (field, host) = (ctx.field, ctx.host);
         let diagonal = mesh.bounds().diagonal();
-        let vertices = vertices_at(field, &mesh.positions)?;
+        let vertices = vertices_at(field, host, &mesh.positions)?;
         let moves = vec![0; vertices.len()];
-        Ok(Self { field, diagonal, mesh: EditMesh::new(mesh)?, vertices, moves })
+        Ok(Self { field, host, diagonal, mesh: EditMesh::new(mesh)?, vertices, moves })
     }
 
     pub(crate) fn at(&self, vertex: u32) -> &Vertex {
@@ -53,10 +56,21 @@ impl<'a> SurfaceMesh<'a> {
         0.5 * (p.position + q.position)
     }
 
-    /// The point of the surface at `point`, unless it is farther away than `reach`.
-    pub(crate) fn foot(&self, point: Vec3, reach: f64) -> Option<Vertex> {
-        let foot = feet(self.field, self.diagonal, &[point])[0]?;
-        ((foot.position - point).norm() <= reach).then_some(foot)
+    /// The points of the surface at `points`; `None` where that fails.
+    pub(crate) fn feet(&self, points: &[Vec3]) -> Vec<Option<Vertex>> {
+        feet(self.field, self.host, self.diagonal, points)
+    }
+
+    /// The same for few points, each unless its foot is farther away than its reach: together
+    /// they cost little more than one.
+    pub(crate) fn feet_within<const N: usize>(
+        &self,
+        points: [Vec3; N],
+        reach: [f64; N],
+    ) -> [Option<Vertex>; N] {
+        let feet = self.feet(&points);
+        let near = |i: usize| feet[i].filter(|f| (f.position - points[i]).norm() <= reach[i]);
+        std::array::from_fn(near)
     }
 
     /// Worst of the faces about a vertex.

@@ -6,9 +6,12 @@ use isospline_fitting::shape::second_fundamental_form;
 use isospline_geometry::Vec3;
 use isospline_implicit::field::SymMat3;
 use isospline_implicit::{Field, Jet2};
+use isospline_stage::{Host, map};
 
 /// Distance from the surface at which a projected point counts as lost (times the diagonal).
 const LOST_REL: f64 = 1e-9;
+/// Points a task: full evaluation blocks, and enough work to be worth handing out.
+const SHARE: usize = 256;
 
 /// A point of the surface, its outward unit normal and its second fundamental form [1/length].
 #[derive(Clone, Copy, Debug)]
@@ -24,21 +27,45 @@ pub(crate) struct Vertex {
 /// [`AdaptError::SingularPoint`] where the gradient is zero or not finite.
 pub(crate) fn vertices_at(
     field: &dyn Field,
+    host: &dyn Host,
     positions: &[Vec3],
 ) -> Result<Vec<Vertex>, AdaptError> {
-    let jets = jets_at(field, positions);
-    let pairs = positions.iter().zip(&jets);
-    pairs.map(|(&p, jet)| vertex(p, jet).ok_or(AdaptError::SingularPoint { place: p })).collect()
+    let found = shared_out(host, positions, |points| {
+        let jets = jets_at(field, points);
+        points.iter().zip(&jets).map(|(&p, jet)| vertex(p, jet)).collect()
+    });
+    let pairs = positions.iter().zip(found);
+    pairs.map(|(&p, found)| found.ok_or(AdaptError::SingularPoint { place: p })).collect()
 }
 
 /// Projects `points` onto the surface; `None` where that fails.
-pub(crate) fn feet(field: &dyn Field, diagonal: f64, points: &[Vec3]) -> Vec<Option<Vertex>> {
-    let mut points = points.to_vec();
-    project_all(field, diagonal, &mut points);
-    let jets = jets_at(field, &points);
+pub(crate) fn feet(
+    field: &dyn Field,
+    host: &dyn Host,
+    diagonal: f64,
+    points: &[Vec3],
+) -> Vec<Option<Vertex>> {
     let near = |jet: &Jet2| jet.value.abs() <= LOST_REL * diagonal * jet.gradient.norm();
-    let pairs = points.iter().zip(&jets);
-    pairs.map(|(&p, jet)| vertex(p, jet).filter(|_| near(jet))).collect()
+    shared_out(host, points, |points| {
+        let mut points = points.to_vec();
+        project_all(field, diagonal, &mut points);
+        let jets = jets_at(field, &points);
+        let pairs = points.iter().zip(&jets);
+        pairs.map(|(&p, jet)| vertex(p, jet).filter(|_| near(jet))).collect()
+    })
+}
+
+/// What `make` says of all points, in their order, [`SHARE`] a task.
+fn shared_out(
+    host: &dyn Host,
+    points: &[Vec3],
+    make: impl Fn(&[Vec3]) -> Vec<Option<Vertex>> + Sync,
+) -> Vec<Option<Vertex>> {
+    if points.len() <= SHARE {
+        return make(points);
+    }
+    let shares: Vec<_> = points.chunks(SHARE).collect();
+    map(host, shares.len(), |k| make(shares[k])).concat()
 }
 
 fn jets_at(field: &dyn Field, points: &[Vec3]) -> Vec<Jet2> {

@@ -58,8 +58,11 @@ impl EditMesh {
         self.lead_from(c, c_to_a);
         self.lead_from(d, d_to_a);
         self.outgoing[b as usize] = GONE;
-        self.faces[h.face() as usize] = [GONE; 3];
-        self.faces[o.face() as usize] = [GONE; 3];
+        for removed in [h.face(), o.face()] {
+            self.faces[removed as usize] = [GONE; 3];
+            let first = 3 * removed as usize;
+            self.opposite[first..first + 3].fill(0);
+        }
         self.n_faces -= 2;
         self.n_vertices -= 1;
     }
@@ -222,6 +225,8 @@ mod tests {
         assert_eq!(compact.positions.len(), mesh.vertex_count());
         assert_eq!(compact.euler_characteristic(&opposite), characteristic);
         assert_eq!(compact.face_components(&opposite).iter().max(), Some(&0));
+        assert_eq!(mesh.edge_list(), mesh.edges().collect::<Vec<_>>());
+        assert!(mesh.edges().all(|h| mesh.is_face(h.face())));
         for v in mesh.vertices() {
             assert!(mesh.spokes(v).all(|h| mesh.origin(h) == v));
             assert!(mesh.valence(v) >= 3);
