@@ -4,6 +4,7 @@
 pub mod curve_samples;
 pub mod edge_end;
 pub mod net;
+pub mod normal_curve;
 pub mod paper_curve;
 pub mod patch_fit;
 pub mod projection;

@@ -10,23 +10,28 @@ use isospline_artifact::kinds::{
     BaseMeshView, Bounds, CurvatureView, CurveFit, CurveStatus, Network,
 };
 use isospline_fitting::curve_samples::Samples;
+use isospline_fitting::edge_end::{ccw, cw};
+use isospline_fitting::normal_curve::slant::Slant;
+use isospline_fitting::normal_curve::{NormalCurve, NormalEdge, NormalFit, NormalOptions};
 use isospline_fitting::paper_curve::{Ends, Solution, fit_curve};
 use isospline_fitting::projection::project_all;
-use isospline_geometry::Vec3;
+use isospline_geometry::{HalfEdge, Vec3};
 use isospline_implicit::Jet1;
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
 use std::ops::Range;
 
-/// Fits each edge by itself under the curvature conditions [TK, Eq. (9)].
+/// Fits each edge by itself under the curvature conditions [TK, Eq. (9b)].
 #[derive(Clone, Debug)]
 pub struct NetworkStage {
     samples: Samples,
+    /// What goes on from the curves of the paper.
+    normal: Option<NormalFit>,
 }
 
 impl Stage for NetworkStage {
     const NAME: &'static str = "network";
-    const VERSION: u32 = 2;
+    const VERSION: u32 = 3;
     type Params = NetworkParams;
     type Whole<'a> = (BaseMeshView<'a>,);
     type Rows<'a> = (CurvatureView<'a>,);
@@ -38,7 +43,10 @@ impl Stage for NetworkStage {
         params: &NetworkParams,
         _: (BaseMeshView<'_>,),
     ) -> Result<Self, NetworkError> {
-        Ok(Self { samples: Samples::new(params.samples) })
+        let options =
+            NormalOptions { samples: params.normal_samples, iterations: params.iterations };
+        let normal = (params.method == Method::Normal).then(|| NormalFit::new(options));
+        Ok(Self { samples: Samples::new(params.samples), normal })
     }
 
     fn plan(&self, (mesh,): (BaseMeshView<'_>,), rows_per_task: usize) -> Plan {
@@ -59,13 +67,20 @@ impl Stage for NetworkStage {
         task: &Task,
     ) -> Result<Piece<Network>, NetworkError> {
         let edges = task.writes[0].clone();
-        let bounds = mesh.bounds[0];
-        let targets = self.targets(ctx, &mesh, &bounds, edges.clone());
+        let all: Vec<Ends> = edges.clone().map(|e| ends(&mesh, &curvature, e)).collect();
+        let mut curves = self.paper_curves(ctx, &mesh, edges.clone(), &all);
+        if let Some(fit) = &self.normal {
+            let slants = edges.clone().map(|e| slants(&mesh, e));
+            let all: Vec<NormalEdge> = all
+                .into_iter()
+                .zip(slants)
+                .map(|(ends, slants)| NormalEdge { ends, slants })
+                .collect();
+            improve(ctx, fit, &all, &mut curves);
+        }
         let mut piece = Piece::<Network>::default();
-        for (edge, targets) in edges.clone().zip(targets.chunks_exact(self.samples.len())) {
-            let solution = fit_curve(&ends(&mesh, &curvature, edge), &self.samples, targets)
-                .ok_or_else(|| no_curve(&mesh, edge))?;
-            record(&mut piece, &solution);
+        for (edge, curve) in edges.clone().zip(curves) {
+            record(&mut piece, &curve.ok_or_else(|| no_curve(&mesh, edge))?);
         }
         measure(ctx, &self.samples, &mesh, edges, &mut piece);
         Ok(piece)
@@ -73,6 +88,19 @@ impl Stage for NetworkStage {
 }
 
 impl NetworkStage {
+    /// The curve of each edge by the method of the paper; `None` where it has none.
+    fn paper_curves(
+        &self,
+        ctx: &Ctx<'_>,
+        mesh: &BaseMeshView<'_>,
+        edges: Range<usize>,
+        all: &[Ends],
+    ) -> Vec<Option<Solution>> {
+        let targets = self.targets(ctx, mesh, &mesh.bounds[0], edges);
+        let targets = targets.chunks_exact(self.samples.len());
+        all.iter().zip(targets).map(|(ends, t)| fit_curve(ends, &self.samples, t)).collect()
+    }
+
     /// Projections of the inner sample points of the chords, edge after edge.
     fn targets(
         &self,
@@ -92,6 +120,28 @@ impl NetworkStage {
     }
 }
 
+/// Replaces curves by ones of less normal distance.
+fn improve(ctx: &Ctx<'_>, fit: &NormalFit, all: &[NormalEdge], curves: &mut [Option<Solution>]) {
+    // A curve from the table of lengths lies too far from any good one to begin with.
+    let sound = |c: &Option<Solution>| c.filter(|c| c.status == CurveStatus::Converged);
+    let starts: Vec<_> = curves.iter().map(|c| sound(c).map(|c| c.inner)).collect();
+    for (curve, better) in curves.iter_mut().zip(fit.fit(ctx.field, all, &starts)) {
+        if let Some(better) = better {
+            *curve = Some(solution(&better));
+        }
+    }
+}
+
+fn solution(curve: &NormalCurve) -> Solution {
+    Solution {
+        inner: curve.inner,
+        tangent: curve.tangent,
+        residual: curve.residual,
+        iterations: curve.iterations,
+        status: CurveStatus::Converged,
+    }
+}
+
 /// Sectors at the two ends of an edge: those of its first half-edge and of the opposite one.
 fn end_sectors(mesh: &BaseMeshView<'_>, edge: usize) -> [usize; 2] {
     mesh.edge_half[edge].map(|h| mesh.sector[h as usize] as usize)
@@ -104,6 +154,21 @@ fn ends(mesh: &BaseMeshView<'_>, curvature: &CurvatureView<'_>, edge: usize) -> 
         normals: sectors.map(|s| Vec3::from(mesh.frame[s].normal)),
         shapes: sectors.map(|s| curvature.shape[s]),
     }
+}
+
+/// How far the tangents of an edge may turn at its ends.
+fn slants(mesh: &BaseMeshView<'_>, edge: usize) -> [Slant; 2] {
+    let position = |v: u32| Vec3::from(mesh.position[v as usize]);
+    let chord = |h: HalfEdge| {
+        let [a, b] = mesh.edge[mesh.edge_of[h.row()] as usize];
+        let d = position(b) - position(a);
+        if mesh.edge_half[mesh.edge_of[h.row()] as usize][0] == h.0 { d } else { -d }
+    };
+    mesh.edge_half[edge].map(|h| {
+        let h = HalfEdge(h);
+        let normal = Vec3::from(mesh.frame[mesh.sector[h.row()] as usize].normal);
+        Slant::between(&chord(h), &chord(ccw(mesh, h)), &chord(cw(mesh, h)), &normal)
+    })
 }
 
 fn no_curve(mesh: &BaseMeshView<'_>, edge: usize) -> NetworkError {

@@ -6,6 +6,8 @@ use isospline_stage::Params;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
+    /// Least normal distance, with free tangent directions: two orders better at the same ends.
+    Normal,
     /// Least squares of the distance to projected chord points [TK, Eq. (9)].
     #[default]
     Paper,
@@ -17,22 +19,33 @@ pub enum Method {
 pub struct NetworkParams {
     /// How curves are fitted; default `paper`.
     pub method: Method,
-    /// Equidistant chord points a curve is fitted to, ends included; 7 to 129, default 17.
-    /// More than 17 gains nothing.
+    /// Equidistant chord points a curve of the paper is fitted to and every curve is measured at,
+    /// ends included; 7 to 129, default 17. More than 17 gains nothing.
     pub samples: u32,
+    /// Samples of the normal distance a curve, 6 to 32, default 12; `normal` only.
+    pub normal_samples: u32,
+    /// Evaluations of the field along a curve at most, 1 to 200, default 30; `normal` only.
+    pub iterations: u32,
 }
 
 impl Default for NetworkParams {
     fn default() -> Self {
-        Self { method: Method::Paper, samples: 17 }
+        Self { method: Method::Paper, samples: 17, normal_samples: 12, iterations: 30 }
     }
 }
 
 impl Params for NetworkParams {
     fn validate(&self) -> Result<(), (&'static str, String)> {
-        if (7..=129).contains(&self.samples) {
-            return Ok(());
+        let ranges = [
+            ("samples", self.samples, 7, 129),
+            ("normal_samples", self.normal_samples, 6, 32),
+            ("iterations", self.iterations, 1, 200),
+        ];
+        for (key, value, low, high) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err((key, format!("{value} is out of range: {low} to {high}")));
+            }
         }
-        Err(("samples", format!("{} is out of range: 7 to 129", self.samples)))
+        Ok(())
     }
 }
