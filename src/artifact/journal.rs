@@ -119,6 +119,13 @@ impl Recorded {
     }
 }
 
+/// xxh3-64 of the rows of a task, section after section, as [`JournalEntry::rows`] holds it.
+pub fn rows_checksum<'a>(sections: impl IntoIterator<Item = &'a [u8]>) -> u64 {
+    let mut hasher = xxhash_rust::xxh3::Xxh3::new();
+    sections.into_iter().for_each(|bytes| hasher.update(bytes));
+    hasher.digest()
+}
+
 fn encode_head(head: &JournalHead) -> [u8; HEAD] {
     let mut out = [0; HEAD];
     out[..8].copy_from_slice(&JOURNAL_MAGIC);

@@ -1,19 +1,18 @@
-//! Brings every node of a graph up to date, in order.
+//! What is to be done, and whether anything is: keys, the lock, the hand-over to the dataflow.
 
 use crate::clock;
-use crate::execute::{Execution, execute};
-use crate::finisher::Finisher;
-use crate::freshness::{Resolved, Source, assess, resolve};
+use crate::dataflow::Dataflow;
+use crate::erase::Failure;
+use crate::freshness::{Resolved, assess, resolve};
 use crate::host::{Listener, Threads};
-use crate::workers::Crew;
+use crate::workers::TaskFailure;
 use crate::{
-    Event, Graph, ModelKey, NodeReport, NodeStatus, Outcome, Reason, Registry, RunError,
-    RunOptions, RunReport, Scene, State, read_provenance,
+    Event, Graph, ModelKey, NodeReport, NodeStatus, Outcome, Registry, RunError, RunOptions,
+    RunReport, Scene, State, read_provenance,
 };
-use isospline_artifact::{Container, Key, SectionSource, Store, StoreError};
+use isospline_artifact::{Container, Store, StoreError};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::thread::Scope;
 
 /// What is to be computed and where it is kept.
 #[derive(Clone, Copy, Debug)]
@@ -48,8 +47,11 @@ impl<'a> Pipeline<'a> {
 
     /// Computes what is not fresh and keeps it in the store; `events` is called from any thread.
     ///
+    /// Where nothing is to be computed, nothing is written and no lock is taken.
+    ///
     /// # Errors
-    /// [`RunError`]; what was finished before is kept, and nothing half-made has a name.
+    /// [`RunError`]; what was finished before is kept under its name, and what was not as a draft
+    /// that the next run goes on with.
     pub fn run(
         &self,
         scene: Scene<'a>,
@@ -59,17 +61,16 @@ impl<'a> Pipeline<'a> {
         let start = clock::now();
         let nodes = resolve(self)?;
         let wanted = Wanted::of(self, options)?;
-        let _lock = self.store.lock()?;
-        let threads = options.threads.max(1);
-        let pool = Threads::new(threads);
+        let pool = Threads::new(options.threads.max(1));
         let frame = Frame { pipeline: *self, nodes, scene, options: *options, events, pool };
-        let reports = std::thread::scope(|scope| {
-            let mut run = Run::new(&frame, scope, wanted);
-            let result = run.all();
-            let stored = run.finisher.take().map_or(Ok(()), Finisher::finish);
-            // A store that fails is the cause of what follows from it.
-            stored.map_err(RunError::Store).and(result).map(|()| run.reports)
-        })?;
+        let reports = match all_fresh(&frame, &wanted)? {
+            Some(reports) => reports,
+            None => {
+                // What another process made meanwhile is looked at again under the lock.
+                let _lock = self.store.lock()?;
+                std::thread::scope(|scope| Dataflow::start(&frame, scope, wanted)?.run())?
+            }
+        };
         let nodes = reports.into_iter().flatten().collect();
         Ok(RunReport { nodes, seconds: start.elapsed().as_secs_f64() })
     }
@@ -77,10 +78,10 @@ impl<'a> Pipeline<'a> {
 
 /// Which nodes to look at, and which to run even if fresh.
 #[derive(Debug)]
-struct Wanted {
-    forced: Vec<bool>,
+pub(crate) struct Wanted {
+    pub(crate) forced: Vec<bool>,
     /// The one stage to run, if not all.
-    only: Option<Vec<bool>>,
+    pub(crate) only: Option<Vec<bool>>,
 }
 
 impl Wanted {
@@ -103,6 +104,59 @@ impl Wanted {
         let forced = forced.unwrap_or_else(|| vec![false; nodes.len()]);
         Ok(Self { forced, only: options.only.map(named).transpose()? })
     }
+
+    /// Whether the node may be run.
+    pub(crate) fn may_run(&self, idx: usize) -> bool {
+        self.only.as_ref().is_none_or(|only| only[idx])
+    }
+}
+
+/// The reports of all nodes, if none of them is to be run.
+fn all_fresh(
+    frame: &Frame<'_>,
+    wanted: &Wanted,
+) -> Result<Option<Vec<Option<NodeReport>>>, RunError> {
+    let mut contents = vec![None; frame.nodes.len()];
+    let mut reports = vec![None; frame.nodes.len()];
+    for (idx, node) in frame.nodes.iter().enumerate() {
+        let (state, container) = assess(&frame.pipeline, node, &contents)?;
+        let forced = wanted.forced[idx] && wanted.may_run(idx);
+        match (state, container) {
+            (State::Fresh, Some(container)) if !forced => {
+                if frame.options.verify && container.verify().is_err() {
+                    return Ok(None);
+                }
+                contents[idx] = Some(container.content());
+                reports[idx] = Some(fresh_report(frame, idx, &Arc::new(container))?);
+            }
+            _ if wanted.may_run(idx) => return Ok(None),
+            _ => {}
+        }
+    }
+    for report in reports.iter().flatten() {
+        (frame.events)(&Event::Fresh { node: report.node, stage: report.stage.clone() });
+    }
+    Ok(Some(reports))
+}
+
+/// The report of a node whose artifact is taken as it is.
+pub(crate) fn fresh_report(
+    frame: &Frame<'_>,
+    idx: usize,
+    container: &Arc<Container>,
+) -> Result<NodeReport, StoreError> {
+    let node = &frame.nodes[idx];
+    let provenance = read_provenance(frame.pipeline.store, &node.artifact)?;
+    Ok(NodeReport {
+        node: idx,
+        stage: node.label.clone(),
+        artifact: node.artifact.clone(),
+        outcome: Outcome::Fresh,
+        content: container.content(),
+        bytes: container.length(),
+        provenance: provenance.filter(|p| p.recipe == container.header().recipe),
+        container: Some(Arc::clone(container)),
+    })
 }
 
 /// What a run works on; outlives its threads.
@@ -119,163 +173,34 @@ impl Frame<'_> {
     pub(crate) fn stopped(&self) -> bool {
         self.options.stop.load(Ordering::Relaxed)
     }
-}
 
-/// State of a run.
-struct Run<'scope, 'f> {
-    frame: &'f Frame<'f>,
-    scope: &'scope Scope<'scope, 'f>,
-    wanted: Wanted,
-    contents: Vec<Option<Key>>,
-    reports: Vec<Option<NodeReport>>,
-    /// Artifacts whose rows are known to be whole.
-    verified: Vec<bool>,
-    crew: Option<Crew<'f>>,
-    finisher: Option<Finisher<'scope>>,
-}
-
-impl<'scope, 'f> Run<'scope, 'f> {
-    fn new(frame: &'f Frame<'f>, scope: &'scope Scope<'scope, 'f>, wanted: Wanted) -> Self {
-        let n = frame.nodes.len();
-        Self {
-            frame,
-            scope,
-            wanted,
-            contents: vec![None; n],
-            reports: vec![None; n],
-            verified: vec![false; n],
-            crew: None,
-            finisher: None,
-        }
+    pub(crate) fn threads(&self) -> usize {
+        self.options.threads.max(1)
     }
 
-    fn all(&mut self) -> Result<(), RunError> {
-        for idx in 0..self.frame.nodes.len() {
-            if self.frame.stopped() {
-                return Err(RunError::Stopped { stage: self.frame.nodes[idx].label.clone() });
+    pub(crate) fn label(&self, idx: usize) -> String {
+        self.nodes[idx].label.clone()
+    }
+
+    /// The run's error for a failed task; a stage that fails after the stop flag was raised did
+    /// so because of it.
+    pub(crate) fn failed(&self, idx: usize, task: usize, failure: TaskFailure) -> RunError {
+        let stage = self.label(idx);
+        match failure {
+            TaskFailure::Panicked(message) => RunError::Panicked { stage, task, message },
+            TaskFailure::Failed(_) if self.stopped() => {
+                RunError::Stopped { stage, kept: Vec::new() }
             }
-            self.bring_up(idx)?;
-        }
-        Ok(())
-    }
-
-    /// Finds node `idx` fresh or runs it.
-    fn bring_up(&mut self, idx: usize) -> Result<(), RunError> {
-        let frame = self.frame;
-        let node = &frame.nodes[idx];
-        let (mut state, container) = assess(&frame.pipeline, node, &self.contents)?;
-        if let (true, Some(container)) = (frame.options.verify, &container) {
-            state = container.verify().map_or_else(damaged, |()| Ok(State::Fresh))?;
-            self.verified[idx] = state == State::Fresh;
-        }
-        let may_run = self.wanted.only.as_ref().is_none_or(|only| only[idx]);
-        let forced = self.wanted.forced[idx] && may_run;
-        match (state, container) {
-            (State::Fresh, Some(container)) if !forced => self.keep(idx, container),
-            _ if !may_run => Ok(()),
-            (State::Fresh, _) => self.execute(idx, vec![Reason::Asked]),
-            (State::Stale(reasons), _) => self.execute(idx, reasons),
-            (State::Missing, _) => self.execute(idx, vec![Reason::Missing]),
-            (State::Damaged(reason), _) => self.rebuild(idx, reason),
+            TaskFailure::Failed(Failure::Stage(source)) => RunError::Stage { stage, source },
+            TaskFailure::Failed(Failure::Rows(source)) => RunError::Rows { stage, source },
+            TaskFailure::Failed(Failure::Params(source)) => RunError::Params { stage, source },
         }
     }
 
-    /// Takes a fresh artifact as it is.
-    fn keep(&mut self, idx: usize, container: Container) -> Result<(), RunError> {
-        let node = &self.frame.nodes[idx];
-        let content = container.content();
-        let provenance = read_provenance(self.frame.pipeline.store, &node.artifact)?;
-        self.contents[idx] = Some(content);
-        self.reports[idx] = Some(NodeReport {
-            node: idx,
-            stage: node.label.clone(),
-            artifact: node.artifact.clone(),
-            outcome: Outcome::Fresh,
-            content,
-            bytes: container.length(),
-            provenance: provenance.filter(|p| p.recipe == container.header().recipe),
-            container: Some(Arc::new(container)),
-        });
-        (self.frame.events)(&Event::Fresh { node: idx, stage: node.label.clone() });
-        Ok(())
-    }
-
-    /// Computes again what is damaged.
-    fn rebuild(&mut self, idx: usize, reason: String) -> Result<(), RunError> {
-        let stage = self.frame.nodes[idx].label.clone();
-        (self.frame.events)(&Event::Damaged { node: idx, stage, reason });
-        self.execute(idx, vec![Reason::Damaged])
-    }
-
-    /// Computes node `idx` from its inputs, which are verified, and rebuilt if they are damaged.
-    fn execute(&mut self, idx: usize, reasons: Vec<Reason>) -> Result<(), RunError> {
-        let frame = self.frame;
-        let node = &frame.nodes[idx];
-        let mut inputs = Vec::with_capacity(node.inputs.len());
-        for input in &node.inputs {
-            let rows: Arc<dyn SectionSource> = match input.source {
-                Source::Node(source) => self.open_input(idx, source)?,
-                Source::Given(k, _) => Arc::clone(&frame.pipeline.graph.nodes[idx].given[k].rows),
-            };
-            inputs.push((input.kind, rows));
-        }
-        let execution = Execution { frame, idx, reasons, inputs, contents: &self.contents };
-        let crew = match &mut self.crew {
-            Some(crew) => crew,
-            none => none.insert(Crew::start(self.scope, frame.options.threads.max(1))?),
-        };
-        let (report, finished) = execute(execution, crew)?;
-        self.contents[idx] = Some(report.content);
-        self.reports[idx] = Some(report);
-        self.verified[idx] = true;
-        let finisher = match &mut self.finisher {
-            Some(finisher) => finisher,
-            none => none.insert(Finisher::start(self.scope, frame.pipeline.store, frame.events)?),
-        };
-        if finisher.take_over(finished) && !finisher.has_failed() {
-            return Ok(());
-        }
-        self.store_failure()
-    }
-
-    /// The store fails: its error tells why.
-    fn store_failure(&mut self) -> Result<(), RunError> {
-        let stored = self.finisher.take().map_or(Ok(()), Finisher::finish);
-        stored.map_err(RunError::Store)
-    }
-
-    /// The artifact of node `source` with whole rows, for node `reader`.
-    fn open_input(&mut self, reader: usize, source: usize) -> Result<Arc<Container>, RunError> {
-        let label = |idx: usize| self.frame.nodes[idx].label.clone();
-        let Some(container) = self.container(source) else {
-            let reason = format!("{} is not fresh", label(source));
-            return Err(RunError::NotReady { stage: label(reader), reason });
-        };
-        if self.verified[source] {
-            return Ok(container);
-        }
-        match container.verify() {
-            Ok(()) => {
-                self.verified[source] = true;
-                Ok(container)
-            }
-            Err(StoreError::Damaged { damage, .. }) if self.wanted.only.is_none() => {
-                self.rebuild(source, damage.to_string())?;
-                Ok(self.container(source).expect("invariant: computed just now"))
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
-
-    fn container(&self, idx: usize) -> Option<Arc<Container>> {
-        self.reports[idx].as_ref().and_then(|r| r.container.clone())
-    }
-}
-
-fn damaged(error: StoreError) -> Result<State, RunError> {
-    match error {
-        StoreError::Damaged { damage, .. } => Ok(State::Damaged(damage.to_string())),
-        other => Err(other.into()),
+    /// The error of a node that was to run alone and reads what is not fresh.
+    pub(crate) fn not_ready(&self, idx: usize, source: usize) -> RunError {
+        let reason = format!("{} is not fresh", self.label(source));
+        RunError::NotReady { stage: self.label(idx), reason }
     }
 }
 

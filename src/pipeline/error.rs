@@ -164,10 +164,12 @@ pub enum RunError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// The stop flag was raised.
-    #[error("stopped in {stage}; what was finished before is kept")]
+    #[error("stopped in {stage}; what was finished is kept{}", told(kept))]
     Stopped {
-        /// The node that was not finished.
+        /// The first node that was not finished.
         stage: String,
+        /// What is kept of unfinished nodes; the next run goes on from there.
+        kept: Vec<Kept>,
     },
     /// The threads could not be started.
     #[error("cannot start {threads} threads")]
@@ -175,6 +177,28 @@ pub enum RunError {
         /// How many.
         threads: usize,
     },
+}
+
+/// What is kept of a node that was not finished.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// The node.
+    pub stage: String,
+    /// Tasks whose rows are kept.
+    pub done: usize,
+    /// All its tasks.
+    pub of: usize,
+}
+
+impl fmt::Display for Kept {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {} tasks of {}", self.done, self.of, self.stage)
+    }
+}
+
+fn told(kept: &[Kept]) -> String {
+    let list: Vec<String> = kept.iter().map(|k| format!(", and {k}")).collect();
+    list.concat()
 }
 
 impl RunError {
@@ -188,7 +212,7 @@ impl RunError {
             | Self::Params { stage, .. }
             | Self::Rows { stage, .. }
             | Self::NotReady { stage, .. }
-            | Self::Stopped { stage } => Some(stage),
+            | Self::Stopped { stage, .. } => Some(stage),
             Self::Graph(_) | Self::NoSuchStage { .. } | Self::Store(_) | Self::Threads { .. } => {
                 None
             }

@@ -22,6 +22,26 @@ pub enum Event {
         /// What is wrong with the file.
         reason: String,
     },
+    /// An earlier run left part of the artifact, which is not made again.
+    Resumed {
+        /// The node.
+        node: usize,
+        /// Its label.
+        stage: String,
+        /// Tasks whose rows are taken.
+        done: u64,
+        /// All tasks.
+        of: u64,
+    },
+    /// What an earlier run left of the artifact, or some of it, is of no use.
+    Discarded {
+        /// The node.
+        node: usize,
+        /// Its label.
+        stage: String,
+        /// Why, or what.
+        reason: String,
+    },
     /// Work begins.
     StageStarted {
         /// The node.

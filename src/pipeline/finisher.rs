@@ -5,9 +5,10 @@
 //! correctness: a later artifact that survives a power cut alone is found fresh once the earlier
 //! one is computed again with equal bytes.
 
-use crate::host::Listener;
+use crate::driver::Frame;
 use crate::provenance::note_name;
-use crate::{Event, Provenance, RunError};
+use crate::trace::Lane;
+use crate::{Event, Provenance, RunError, clock};
 use crossbeam::channel::{Receiver, Sender, unbounded};
 use isospline_artifact::{Sealed, Store, StoreError};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
@@ -34,8 +35,7 @@ pub(crate) struct Finisher<'scope> {
 impl<'scope> Finisher<'scope> {
     pub(crate) fn start<'a>(
         scope: &'scope Scope<'scope, 'a>,
-        store: &'a dyn Store,
-        events: Listener<'a>,
+        frame: &'a Frame<'a>,
     ) -> Result<Self, RunError> {
         // Unbounded, but never longer than the graph: one entry a node.
         let (inbox, arrivals) = unbounded();
@@ -43,15 +43,15 @@ impl<'scope> Finisher<'scope> {
         for k in 0..THREADS {
             let builder = Builder::new().name(format!("isospline-store-{k}"));
             let arrivals = arrivals.clone();
-            let thread = builder.spawn_scoped(scope, move || serve(store, events, &arrivals));
+            let thread = builder.spawn_scoped(scope, move || serve(frame, k, &arrivals));
             threads.push(thread.map_err(|_| RunError::Threads { threads: THREADS })?);
         }
         Ok(Self { inbox, threads })
     }
 
-    /// Hands over an artifact; false if all threads have given up.
-    pub(crate) fn take_over(&self, finished: Finished) -> bool {
-        self.inbox.send(finished).is_ok()
+    /// Hands over an artifact; if all threads have given up, [`Finisher::finish`] tells why.
+    pub(crate) fn take_over(&self, finished: Finished) {
+        drop(self.inbox.send(finished));
     }
 
     /// Whether an artifact could not be stored.
@@ -72,14 +72,18 @@ impl<'scope> Finisher<'scope> {
 
 /// Stores what arrives, until the first failure.
 fn serve(
-    store: &dyn Store,
-    events: Listener<'_>,
+    frame: &Frame<'_>,
+    number: usize,
     arrivals: &Receiver<Finished>,
 ) -> Result<(), StoreError> {
+    let store = frame.pipeline.store;
+    let lane = Lane::new(frame.options.trace, || format!("store {number}"));
     for finished in arrivals {
+        let (start, label) = (clock::now(), finished.label.clone());
         let stored = publish(store, finished)?;
         store.sync_names()?;
-        events(&stored);
+        lane.note(&label, "store", start, None);
+        (frame.events)(&stored);
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use crate::keys::{Ingredient, changes, ingredients, key_of};
 use crate::provenance::InputRecord;
 use crate::{Pipeline, Reason, RunError, StageInfo, read_provenance};
-use isospline_artifact::{Container, Key, StoreError};
+use isospline_artifact::{Container, Identity, Key, StoreError};
 use std::fmt;
 
 /// Whether a node's artifact can be used.
@@ -85,6 +85,17 @@ impl Input {
 }
 
 impl Resolved {
+    /// What the header of its artifact says before its rows are made.
+    pub(crate) fn identity(&self) -> Identity {
+        Identity {
+            kind: self.info.kind,
+            schema: self.info.schema,
+            stage: self.info.name.to_owned(),
+            stage_version: self.info.version,
+            recipe: self.recipe,
+        }
+    }
+
     /// The key over the contents of the inputs, where all are known.
     pub(crate) fn derivation(&self, contents: &[Option<Key>]) -> Option<Key> {
         let inputs = self.inputs.iter().map(|i| Some((i.kind, i.content(contents)?)));
@@ -170,7 +181,11 @@ fn reasons(
 ) -> Result<Vec<Reason>, StoreError> {
     let record = read_provenance(pipeline.store, &node.artifact)?;
     let Some(record) = record.filter(|r| r.recipe == recipe) else {
-        return Ok(vec![Reason::Unrecorded]);
+        // The artifact's derivation can still tell, once all inputs are there.
+        let unknown = node.inputs.iter().filter(|input| input.content(contents).is_none());
+        let pending = unknown.map(|input| Reason::Pending { stage: input.label.clone() });
+        let pending: Vec<Reason> = pending.collect();
+        return Ok(if pending.is_empty() { vec![Reason::Unrecorded] } else { pending });
     };
     let mut reasons = changes(&record.ingredients, &node.ingredients);
     for (k, input) in node.inputs.iter().enumerate() {

@@ -4,11 +4,11 @@
 //! and why the rest is not; [`Pipeline::run`] computes the rest.
 
 mod clock;
+mod dataflow;
 pub mod driver;
 mod erase;
 pub mod error;
 pub mod event;
-mod execute;
 #[cfg(test)]
 mod faulty;
 mod finisher;
@@ -18,16 +18,22 @@ mod host;
 pub mod keys;
 mod memory;
 pub mod options;
+mod prepare;
 pub mod provenance;
+mod readiness;
 pub mod registry;
 pub mod report;
+mod resume;
+mod row_writer;
+mod tally;
 mod tiling;
 #[cfg(test)]
 mod toys;
+pub mod trace;
 mod workers;
 
 pub use driver::Pipeline;
-pub use error::{GraphError, ParamsError, RunError, StageFailure};
+pub use error::{GraphError, Kept, ParamsError, RunError, StageFailure};
 pub use event::Event;
 pub use freshness::{NodeStatus, State};
 pub use graph::{Given, Graph, ModelKey, Node};
@@ -37,3 +43,4 @@ pub use options::{RunOptions, Scene};
 pub use provenance::{Provenance, read_provenance};
 pub use registry::{Registry, StageInfo};
 pub use report::{NodeReport, Outcome, RunReport};
+pub use trace::Trace;

@@ -1,5 +1,6 @@
 //! How a run is to be done; nothing here changes a byte of the output.
 
+use crate::Trace;
 use isospline_geometry::Aabb;
 use isospline_implicit::Field;
 use std::fmt;
@@ -27,6 +28,8 @@ pub struct RunOptions<'a> {
     pub threads: usize,
     /// Rows a task, about; default 512: a task then takes 0.2 to 5 ms, long against the 5 us
     /// that handing it over costs, short against a second's notice to stop.
+    ///
+    /// An artifact that was left unfinished is begun anew with another size.
     pub rows_per_task: usize,
     /// This stage and all that follow are run even if they are fresh.
     pub from: Option<&'a str>,
@@ -34,6 +37,11 @@ pub struct RunOptions<'a> {
     pub only: Option<&'a str>,
     /// Whether the rows of fresh artifacts are verified too, and damaged ones made again.
     pub verify: bool,
+    /// Whether a stage begins with the rows that are there of stages still at work; otherwise the
+    /// stages run one after another, which is of use to measure them.
+    pub streaming: bool,
+    /// Where to note who did what when.
+    pub trace: Option<&'a Trace>,
     /// Raised from outside, it ends the run soon.
     pub stop: &'a AtomicBool,
 }
@@ -43,6 +51,15 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 impl Default for RunOptions<'_> {
     fn default() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { threads, rows_per_task: 512, from: None, only: None, verify: false, stop: &NEVER }
+        Self {
+            threads,
+            rows_per_task: 512,
+            from: None,
+            only: None,
+            verify: false,
+            streaming: true,
+            trace: None,
+            stop: &NEVER,
+        }
     }
 }

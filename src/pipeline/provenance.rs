@@ -2,8 +2,9 @@
 //!
 //! Never needed to read an artifact or to find it fresh; it says why a stale one is stale.
 
+use crate::driver::Frame;
 use crate::keys::Ingredient;
-use isospline_artifact::{Key, Store, StoreError};
+use isospline_artifact::{Key, Sealed, Store, StoreError};
 use isospline_stage::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +63,7 @@ pub struct InputRecord {
 /// What a stage cost; recorded, never hashed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Wall time of all.
+    /// Wall time from the preparation to the last hash; stages at work at once share it.
     pub seconds: f64,
     /// Wall time of `prepare` and `plan`.
     pub prepare_seconds: f64,
@@ -72,6 +73,9 @@ pub struct Cost {
     pub seal_seconds: f64,
     /// Tasks.
     pub tasks: usize,
+    /// Tasks of these whose rows an earlier run left; their times are not in these figures.
+    #[serde(default)]
+    pub resumed_tasks: usize,
     /// Threads of the run.
     pub threads: usize,
     /// Largest resident memory of the process up to the end of the stage, bytes; 0 if unknown.
@@ -99,6 +103,38 @@ pub fn read_provenance(
 }
 
 impl Provenance {
+    /// The record of an artifact that this run made.
+    pub(crate) fn of(
+        frame: &Frame<'_>,
+        idx: usize,
+        contents: &[Option<Key>],
+        sealed: &Sealed,
+        counters: Counters,
+        cost: Cost,
+    ) -> Self {
+        let node = &frame.nodes[idx];
+        let header = sealed.container.header();
+        Self {
+            model: frame.pipeline.model.name.clone(),
+            stage: node.info.name.to_owned(),
+            stage_version: node.info.version,
+            round: frame.pipeline.graph.nodes[idx].round,
+            kind: node.info.kind.to_owned(),
+            schema: node.info.schema,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            recipe: header.recipe,
+            derivation: header.derivation,
+            content: sealed.container.content(),
+            params: node.params.clone(),
+            ingredients: node.ingredients.clone(),
+            inputs: node.input_records(contents),
+            rows: header.sections.iter().map(|s| (s.name.clone(), s.rows)).collect(),
+            bytes: sealed.container.length(),
+            counters,
+            cost,
+        }
+    }
+
     /// The text of the record's file.
     pub fn to_json(&self) -> Vec<u8> {
         let mut text = serde_json::to_vec_pretty(self).expect("invariant: maps have text keys");

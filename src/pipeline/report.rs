@@ -1,7 +1,7 @@
 //! What a run did.
 
 use crate::Provenance;
-use isospline_artifact::{Container, Key};
+use isospline_artifact::{Container, Key, Sealed};
 use std::sync::Arc;
 
 /// What happened to a node.
@@ -33,6 +33,33 @@ pub struct NodeReport {
     pub provenance: Option<Provenance>,
     /// The artifact, if the run computed or read it.
     pub container: Option<Arc<Container>>,
+}
+
+impl NodeReport {
+    pub(crate) fn computed(
+        stage: &str,
+        artifact: &str,
+        node: usize,
+        sealed: &Sealed,
+        provenance: &Provenance,
+    ) -> Self {
+        Self {
+            node,
+            stage: stage.to_owned(),
+            artifact: artifact.to_owned(),
+            outcome: Outcome::Computed,
+            content: sealed.container.content(),
+            bytes: sealed.container.length(),
+            provenance: Some(provenance.clone()),
+            container: Some(Arc::clone(&sealed.container)),
+        }
+    }
+
+    /// Tasks that this run took from an earlier one.
+    pub fn resumed_tasks(&self) -> usize {
+        let record = self.provenance.as_ref().filter(|_| self.outcome == Outcome::Computed);
+        record.map_or(0, |record| record.cost.resumed_tasks)
+    }
 }
 
 /// A finished run.

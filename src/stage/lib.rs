@@ -11,5 +11,5 @@ pub mod stage;
 pub use counters::Counters;
 pub use host::{Host, Serial, Stopped, map};
 pub use inputs::{InputSource, Inputs};
-pub use plan::{Plan, Task};
+pub use plan::{Need, Plan, Task};
 pub use stage::{Ctx, Diagnosis, Params, Piece, Stage};

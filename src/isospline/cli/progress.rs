@@ -37,6 +37,12 @@ impl Progress {
             Event::Damaged { stage, reason, .. } => {
                 self.line(&format!("{stage:<15}is made again: {reason}"));
             }
+            Event::Resumed { stage, done, of, .. } => {
+                self.line(&format!("{stage:<15}goes on: {done} of {of} tasks are there"));
+            }
+            Event::Discarded { stage, reason, .. } => {
+                self.line(&format!("{stage:<15}what was begun is not used: {reason}"));
+            }
             Event::Fresh { .. } | Event::Stored { .. } => {}
         }
     }

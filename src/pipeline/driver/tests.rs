@@ -54,9 +54,10 @@ fn every_stage_tells_start_progress_end_and_storage() {
         .map(|e| serde_json::to_value(e).unwrap())
         .map(|e| format!("{} {}", e["event"].as_str().unwrap(), e["stage"].as_str().unwrap()))
         .collect();
-    let stages = ["seed", "blend", "fit"];
-    let expected = stages.map(|s| [format!("stage_started {s}"), format!("stage_finished {s}")]);
-    assert_eq!(text, expected.concat());
+    for stage in ["seed", "blend", "fit"] {
+        let told = text.iter().filter(|t| t.ends_with(stage)).collect::<Vec<_>>();
+        assert_eq!(told, [&format!("stage_started {stage}"), &format!("stage_finished {stage}")]);
+    }
     let progress = |e: &Event| match e {
         Event::Progress { node: 1, done, of: 10, .. } => Some(*done),
         _ => None,
@@ -198,7 +199,7 @@ fn a_stopped_run_keeps_what_is_finished_and_can_go_on() {
     let options = RunOptions { stop: &stop, ..options(2, 1) };
     let scene = Scene { field: &NoField, domain: Aabb::EMPTY };
     let failed = bench.pipeline(&store).run(scene, &options, &listen).unwrap_err();
-    assert!(matches!(&failed, RunError::Stopped { stage } if stage == "blend"), "{failed}");
+    assert!(matches!(&failed, RunError::Stopped { stage, .. } if stage == "blend"), "{failed}");
     assert_eq!(store.names().unwrap(), [FILES[0]]);
     assert_eq!(bench.computed(&store), ["blend", "fit"]);
     assert!(all_bytes(&store) == expected);
