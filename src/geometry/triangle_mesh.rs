@@ -75,26 +75,30 @@ impl TriangleMesh {
     /// along their edges.
     pub fn opposites(&self) -> Result<Vec<u32>, Defect> {
         let (first, leaving) = self.leaving_half_edges()?;
-        let leaving_from = |v: u32| {
-            let v = v as usize;
-            leaving[first[v] as usize..first[v + 1] as usize].iter().map(|&h| HalfEdge(h))
-        };
+        let leaving_from =
+            |v: u32| &leaving[first[v as usize] as usize..first[v as usize + 1] as usize];
         let mut opposite = vec![BORDER; 3 * self.faces.len()];
-        for h in (0..3 * self.faces.len() as u32).map(HalfEdge) {
-            let (from, to) = (self.origin(h), self.origin(h.next()));
-            // Rows of a vertex ascend, so the second face along a directed edge finds the first.
-            if leaving_from(from).take_while(|o| o.0 < h.0).any(|o| self.origin(o.next()) == to) {
-                return Err(Defect::DoubledHalfEdge { face: h.face(), from, to });
-            }
-            if let Some(o) = leaving_from(to).find(|o| self.origin(o.next()) == from) {
-                opposite[h.row()] = o.0;
+        for (f, face) in (0u32..).zip(&self.faces) {
+            for k in 0..3 {
+                let h = HalfEdge::new(f, k);
+                let (from, to) = (face[k as usize], face[(k as usize + 1) % 3]);
+                // Rows of a vertex ascend, so the second face along a directed edge finds the
+                // first.
+                let mut earlier = leaving_from(from).iter().take_while(|o| o.half < h.0);
+                if earlier.any(|o| o.to == to) {
+                    return Err(Defect::DoubledHalfEdge { face: f, from, to });
+                }
+                if let Some(o) = leaving_from(to).iter().find(|o| o.to == from) {
+                    opposite[h.row()] = o.half;
+                }
             }
         }
         Ok(opposite)
     }
 
-    /// Half-edges sorted by their origin: first row of each vertex (and the end), and the rows.
-    fn leaving_half_edges(&self) -> Result<(Vec<u32>, Vec<u32>), Defect> {
+    /// Half-edges sorted by their origin: first row of each vertex (and the end), and the rows,
+    /// each with the vertex that the half-edge reaches.
+    fn leaving_half_edges(&self) -> Result<(Vec<u32>, Vec<Leaving>), Defect> {
         let n = self.positions.len();
         let mut first = vec![0u32; n + 2];
         for (f, face) in (0u32..).zip(&self.faces) {
@@ -111,11 +115,13 @@ impl TriangleMesh {
         for v in 0..=n {
             first[v + 1] += first[v];
         }
-        let mut leaving = vec![0u32; 3 * self.faces.len()];
-        for (h, &v) in (0u32..).zip(self.faces.iter().flatten()) {
-            let row = &mut first[v as usize + 1];
-            leaving[*row as usize] = h;
-            *row += 1;
+        let mut leaving = vec![Leaving { half: 0, to: 0 }; 3 * self.faces.len()];
+        for (f, &[a, b, c]) in (0u32..).zip(&self.faces) {
+            for (half, from, to) in [(3 * f, a, b), (3 * f + 1, b, c), (3 * f + 2, c, a)] {
+                let row = &mut first[from as usize + 1];
+                leaving[*row as usize] = Leaving { half, to };
+                *row += 1;
+            }
         }
         first.truncate(n + 1);
         Ok((first, leaving))
@@ -188,6 +194,13 @@ impl TriangleMesh {
         let [a, b, c] = self.corners(face);
         a.dot(&b.cross(&c)) / 6.0
     }
+}
+
+/// A half-edge with the vertex that it reaches.
+#[derive(Clone, Copy, Debug)]
+struct Leaving {
+    half: u32,
+    to: u32,
 }
 
 /// Faces met going counter-clockwise about the origin of `start` until the border or `start`.

@@ -248,7 +248,7 @@ fn collapse_candidates(
     let quiet: Vec<EdgeError> =
         errors.iter().map(|&(h, _)| (h, score(h))).filter(|&(_, e)| e < limit).collect();
     // Neighbours exclude each other and the gate refuses some: look at more than are wanted.
-    let quiet = first_by(quiet, 12 * n_wanted + 64, |x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
+    let quiet = first_by(quiet, 6 * n_wanted + 32, |x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
     let middles: Vec<_> = quiet.iter().map(|&(h, _)| surface.middle(h)).collect();
     let merged = surface.feet(&middles);
     let mut candidates = Vec::new();
