@@ -8,7 +8,7 @@ pub trait InputSource {
     fn input(&self, kind: &str) -> Option<&dyn SectionSource>;
 }
 
-/// A bundle of views: `()`, a view, or a tuple of up to four.
+/// A bundle of views: `()`, a view, or a tuple of up to six.
 pub trait Inputs<'a>: Sized + Copy + Send + Sync {
     /// The kinds read, in order.
     const KINDS: &'static [&'static str];
@@ -49,3 +49,5 @@ tuple_inputs!(A);
 tuple_inputs!(A, B);
 tuple_inputs!(A, B, C);
 tuple_inputs!(A, B, C, D);
+tuple_inputs!(A, B, C, D, E);
+tuple_inputs!(A, B, C, D, E, F);

@@ -1,18 +1,19 @@
 //! Stage `edge_systems`: first inner rows that satisfy the G1 condition along every edge.
 
-mod edge;
 mod error;
 mod params;
-mod system;
 
 pub use error::EdgeSystemsError;
 pub use params::EdgeSystemsParams;
 
-use edge::Edge;
 use isospline_artifact::kinds::{
     BaseMeshView, EdgeSystems, EdgeWeights, G0FitView, NetworkView, VertexSystemsView,
 };
-use isospline_geometry::{HalfEdge, Vec3};
+use isospline_fitting::edge_rows::Edge;
+use isospline_fitting::edge_system::solve;
+use isospline_fitting::net::point;
+use isospline_geometry::HalfEdge;
+use isospline_geometry::bezier_triangle::first_inner_slot;
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
 use std::ops::Range;
@@ -54,9 +55,15 @@ impl Stage for EdgeSystemsStage {
         task: &Task,
     ) -> Result<Piece<EdgeSystems>, EdgeSystemsError> {
         let mut piece = Piece::<EdgeSystems>::default();
+        let points = |h: HalfEdge| {
+            let twist = |h: HalfEdge| vertices.twist[mesh.star_row[h.row()] as usize].into();
+            let slot = |s| first_inner_slot(h.corner() as usize, s);
+            let inner = |s| point(&g0_fit.interior[h.face() as usize], slot(s));
+            [twist(h), inner(2), inner(3), inner(4), twist(h.next())]
+        };
         for e in task.writes[0].clone() {
-            let mut edge = Edge::new(&mesh, &network, &g0_fit, &vertices, e);
-            let nu = system::solve(&mut edge, self.nu_weight);
+            let mut edge = Edge::new(&mesh, &network, points, vertices.weights, e);
+            let nu = solve(&mut edge, 0.0, self.nu_weight);
             let residual = edge.residual();
             piece.rows.left.push(edge.model_row(&edge.p));
             piece.rows.right.push(edge.model_row(&edge.r));
@@ -87,10 +94,4 @@ fn task(mesh: &BaseMeshView<'_>, edges: Range<usize>) -> Task {
         ],
         writes: vec![edges; 3],
     }
-}
-
-/// Three points as a row.
-fn flat(points: [Vec3; 3]) -> [f64; 9] {
-    let [a, b, c] = points;
-    [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]
 }

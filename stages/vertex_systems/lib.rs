@@ -2,8 +2,6 @@
 
 mod error;
 mod params;
-mod star;
-mod tangential;
 
 pub use error::VertexSystemsError;
 pub use params::VertexSystemsParams;
@@ -11,13 +9,14 @@ pub use params::VertexSystemsParams;
 use isospline_artifact::kinds::{
     BaseMeshView, CurvatureView, G0FitView, NetworkView, VertexSystems,
 };
-use isospline_fitting::edge_end::ccw;
-use isospline_geometry::{HalfEdge, Vec3};
+use isospline_fitting::net::point;
+use isospline_fitting::vertex_star::Star;
+use isospline_fitting::vertex_system::Solver;
+use isospline_geometry::HalfEdge;
+use isospline_geometry::bezier_triangle::first_inner_slot;
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
-use star::Star;
 use std::ops::Range;
-use tangential::Solver;
 
 /// Solves rows k = 0 and k = 1 of the G1 condition about each vertex [TK, Eq. (14)-(19)].
 #[derive(Clone, Copy, Debug)]
@@ -56,8 +55,12 @@ impl Stage for VertexSystemsStage {
     ) -> Result<Piece<VertexSystems>, VertexSystemsError> {
         let mut piece = Piece::<VertexSystems>::default();
         let mut solver = Solver::default();
+        let start = |h: HalfEdge| {
+            let slot = first_inner_slot(h.corner() as usize, 1);
+            point(&g0_fit.interior[h.face() as usize], slot)
+        };
         for vertex in task.writes[2].clone() {
-            let star = Star::new(&mesh, &curvature, &network, &g0_fit, vertex);
+            let star = Star::new(&mesh, &curvature, &network, start, vertex);
             let repaired = solver.solve(&star).ok_or(VertexSystemsError::Degenerate {
                 vertex: vertex as u32,
                 place: star.origin,
@@ -96,37 +99,5 @@ fn task(mesh: &BaseMeshView<'_>, vertices: Range<usize>) -> Task {
             need(2, "interior", faces),
         ],
         writes: vec![star_rows.clone(), star_rows, vertices],
-    }
-}
-
-/// Outgoing half-edges of a vertex, counter-clockwise.
-fn spokes(mesh: &BaseMeshView<'_>, vertex: usize) -> impl Iterator<Item = HalfEdge> {
-    let rows = mesh.star_first[vertex] as usize..mesh.star_first[vertex + 1] as usize;
-    let halves = mesh.star[rows].to_vec();
-    debug_assert!(halves.windows(2).all(|h| ccw(mesh, HalfEdge(h[0])).0 == h[1]));
-    halves.into_iter().map(HalfEdge)
-}
-
-/// The tangential and the normal part of a vector in a plane frame.
-#[derive(Clone, Copy, Debug)]
-struct Frame {
-    axes: [Vec3; 2],
-    normal: Vec3,
-}
-
-impl Frame {
-    fn about(normal: Vec3) -> Self {
-        // The axis least along the normal keeps the cross product well away from zero.
-        let k = normal.iamin();
-        let e1 = normal.cross(&Vec3::ith(k, 1.0)).normalize();
-        Self { axes: [e1, normal.cross(&e1)], normal }
-    }
-
-    fn flatten(&self, v: &Vec3) -> [f64; 2] {
-        self.axes.map(|a| a.dot(v))
-    }
-
-    fn lift(&self, [x, y]: [f64; 2], height: f64) -> Vec3 {
-        x * self.axes[0] + y * self.axes[1] + height * self.normal
     }
 }

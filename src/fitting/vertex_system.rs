@@ -3,7 +3,7 @@
 //! Each row's component along its own edge only fixes `mu1`, so the twists answer to the
 //! components across: n equations in 2n unknowns, of full rank while neighbouring tangents differ.
 
-use crate::star::Star;
+use crate::vertex_star::Star;
 use isospline_geometry::Vec3;
 
 /// Added to a diagonal that lost its rank to rounding, times its largest entry.
@@ -13,11 +13,11 @@ const REFINEMENTS: u32 = 2;
 
 /// Buffers of the solver and the result of its last solve.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Solver {
+pub struct Solver {
     /// Twists relative to the vertex, in model units, in spoke order.
-    pub(crate) twists: Vec<Vec3>,
+    pub twists: Vec<Vec3>,
     /// `mu1` of each spoke.
-    pub(crate) mu1: Vec<f64>,
+    pub mu1: Vec<f64>,
     flat: Vec<[f64; 2]>,
     factor: Vec<f64>,
     rows: Vec<Row>,
@@ -37,7 +37,7 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 
 impl Solver {
     /// Solves a star; true if the system had to be regularised, `None` if it has no solution.
-    pub(crate) fn solve(&mut self, star: &Star) -> Option<bool> {
+    pub fn solve(&mut self, star: &Star) -> Option<bool> {
         let n = star.spokes.len();
         self.rows.clear();
         self.rows.extend((0..n).map(|i| row(star, i)));

@@ -2,43 +2,47 @@
 //
 // symbols: q quartic boundary, p and r first inner rows left and right, both along the edge
 
-use crate::flat;
-use isospline_artifact::kinds::{BaseMeshView, G0FitView, NetworkView, VertexSystemsView};
-use isospline_fitting::edge_end::{outgoing_curve, outgoing_tangent};
-use isospline_fitting::net::point;
-use isospline_geometry::bezier_triangle::first_inner_slot;
+use crate::edge_end::{outgoing_curve, outgoing_tangent};
+use isospline_artifact::kinds::{BaseMeshView, NetworkView};
 use isospline_geometry::{HalfEdge, Vec3};
 
 /// One edge between two faces.
 #[derive(Clone, Debug)]
-pub(crate) struct Edge {
-    pub(crate) q: [Vec3; 5],
-    /// Rows 0..=6; 2, 3, 4 start from the G0 fit and are what the system moves.
-    pub(crate) p: [Vec3; 7],
-    pub(crate) r: [Vec3; 7],
-    pub(crate) lambda: [f64; 2],
+pub struct Edge {
+    /// Control points of the curve.
+    pub q: [Vec3; 5],
+    /// Left row 0..=6; 2, 3, 4 are what the system moves.
+    pub p: [Vec3; 7],
+    /// Right row, along the edge as well.
+    pub r: [Vec3; 7],
+    /// `lambda_0`, `lambda_1`.
+    pub lambda: [f64; 2],
     /// `mu_0 .. mu_4`; `mu_2` belongs to the system.
-    pub(crate) mu: [f64; 5],
+    pub mu: [f64; 5],
     origin: Vec3,
     chord: f64,
 }
 
 impl Edge {
-    pub(crate) fn new(
+    /// The data of `edge`.
+    ///
+    /// `points` are steps 1..=5 of the first inner row along a half-edge, in model units;
+    /// `weights` are `[lambda0, mu0, mu1]` in star order.
+    pub fn new(
         mesh: &BaseMeshView<'_>,
         network: &NetworkView<'_>,
-        g0_fit: &G0FitView<'_>,
-        vertices: &VertexSystemsView<'_>,
+        points: impl Fn(HalfEdge) -> [Vec3; 5],
+        weights: &[[f64; 3]],
         edge: usize,
     ) -> Self {
         let [h, g] = mesh.edge_half[edge].map(HalfEdge);
         let curve = outgoing_curve(mesh, network, h);
         let (origin, chord) = (curve[0], (curve[4] - curve[0]).norm());
         let local = |p: Vec3| (p - origin) / chord;
-        let row = |half| inner_row(mesh, network, g0_fit, vertices, half).map(local);
+        let row = |half| inner_row(mesh, network, half, points(half)).map(local);
         let mut r = row(g);
         r.reverse();
-        let [at_a, at_b] = [h, g].map(|half| vertices.weights[mesh.star_row[half.row()] as usize]);
+        let [at_a, at_b] = [h, g].map(|half| weights[mesh.star_row[half.row()] as usize]);
         let mut edge = Self {
             q: curve.map(local),
             p: row(h),
@@ -53,17 +57,17 @@ impl Edge {
     }
 
     /// `mu2` of the case of equal lambdas [TK, Eq. (23)].
-    pub(crate) fn paper_mu2(&self) -> f64 {
+    pub fn paper_mu2(&self) -> f64 {
         (-self.mu[0] + 4.0 * self.mu[1] + 4.0 * self.mu[3] - self.mu[4]) / 6.0
     }
 
     /// Points 2, 3, 4 of a row in model units.
-    pub(crate) fn model_row(&self, row: &[Vec3; 7]) -> [f64; 9] {
+    pub fn model_row(&self, row: &[Vec3; 7]) -> [f64; 9] {
         flat([2, 3, 4].map(|s| self.origin + self.chord * row[s]))
     }
 
     /// Largest residual of the eight rows of the G1 condition [TK, Eq. (3)], in chords.
-    pub(crate) fn residual(&self) -> f64 {
+    pub fn residual(&self) -> f64 {
         (0..8).map(|k| self.row_residual(k).norm()).fold(0.0, f64::max)
     }
 
@@ -90,24 +94,26 @@ impl Edge {
     }
 }
 
-/// First inner row of the face of `h`, along `h`, in model units: ends from the neighbouring
-/// curves, then twists, and the G0 fit between.
+/// First inner row of the face of `h`, along `h`, in model units: its ends follow from the
+/// neighbouring curves.
 fn inner_row(
     mesh: &BaseMeshView<'_>,
     network: &NetworkView<'_>,
-    g0_fit: &G0FitView<'_>,
-    vertices: &VertexSystemsView<'_>,
     h: HalfEdge,
+    [p1, p2, p3, p4, p5]: [Vec3; 5],
 ) -> [Vec3; 7] {
     let position = |h: HalfEdge| {
         Vec3::from(mesh.position[mesh.face[h.face() as usize][h.corner() as usize] as usize])
     };
-    let twist = |h: HalfEdge| Vec3::from(vertices.twist[mesh.star_row[h.row()] as usize]);
     // The curve of the previous half-edge ends here; its reverse leaves the same vertex.
     let back = HalfEdge(mesh.opposite[h.prev().row()]);
     let first = position(h) + outgoing_tangent(mesh, network, back) * (4.0 / 7.0);
     let last = position(h.next()) + outgoing_tangent(mesh, network, h.next()) * (4.0 / 7.0);
-    let interior = &g0_fit.interior[h.face() as usize];
-    let inner = |s| point(interior, first_inner_slot(h.corner() as usize, s));
-    [first, twist(h), inner(2), inner(3), inner(4), twist(h.next()), last]
+    [first, p1, p2, p3, p4, p5, last]
+}
+
+/// Three points as a row.
+fn flat(points: [Vec3; 3]) -> [f64; 9] {
+    let [a, b, c] = points;
+    [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]
 }

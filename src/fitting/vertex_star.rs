@@ -1,49 +1,53 @@
 //! The data of one vertex: its spokes with curves, weights and start twists.
 
-use crate::{Frame, spokes};
-use isospline_artifact::kinds::{BaseMeshView, CurvatureView, G0FitView, NetworkView};
-use isospline_fitting::edge_end::{end_weights, outgoing_curve, weights_at_origin};
-use isospline_fitting::net::point;
-use isospline_fitting::shape::apply;
-use isospline_geometry::bezier_triangle::first_inner_slot;
+use crate::edge_end::{ccw, end_weights, outgoing_curve, weights_at_origin};
+use crate::shape::apply;
+use isospline_artifact::kinds::{BaseMeshView, CurvatureView, NetworkView};
 use isospline_geometry::{HalfEdge, Vec3};
 use isospline_implicit::SymMat3;
 
 /// One outgoing edge; vectors are relative to the vertex and divided by `Star::scale`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spoke {
+pub struct Spoke {
     /// `q1 - o`.
-    pub(crate) q1: Vec3,
+    pub q1: Vec3,
     /// `q2 - o`.
-    pub(crate) q2: Vec3,
+    pub q2: Vec3,
     /// Elevated first point, `c - o = 4/7 (q1 - o)`.
-    pub(crate) c: Vec3,
-    /// Start twist of the face left of the edge, from the G0 fit.
-    pub(crate) twist: Vec3,
-    /// Weights of this end, and `lambda` at the far end.
-    pub(crate) lambda0: f64,
-    pub(crate) mu0: f64,
-    pub(crate) lambda1: f64,
+    pub c: Vec3,
+    /// Start twist of the face left of the edge.
+    pub twist: Vec3,
+    /// `lambda` at this end.
+    pub lambda0: f64,
+    /// `mu` at this end.
+    pub mu0: f64,
+    /// `lambda` at the far end.
+    pub lambda1: f64,
 }
 
 /// A vertex and its spokes, counter-clockwise.
 #[derive(Clone, Debug)]
-pub(crate) struct Star {
-    pub(crate) origin: Vec3,
+pub struct Star {
+    /// The vertex.
+    pub origin: Vec3,
     /// Mean tangent length: slivers would otherwise cost digits.
-    pub(crate) scale: f64,
-    pub(crate) frame: Frame,
+    pub scale: f64,
+    /// Tangent plane and normal.
+    pub frame: Frame,
     /// Second fundamental form times `scale`.
-    pub(crate) shape: SymMat3,
-    pub(crate) spokes: Vec<Spoke>,
+    pub shape: SymMat3,
+    /// Counter-clockwise.
+    pub spokes: Vec<Spoke>,
 }
 
 impl Star {
-    pub(crate) fn new(
+    /// The star of `vertex`; `twist` is the start of the face left of an outgoing half-edge, in
+    /// model units.
+    pub fn new(
         mesh: &BaseMeshView<'_>,
         curvature: &CurvatureView<'_>,
         network: &NetworkView<'_>,
-        g0_fit: &G0FitView<'_>,
+        twist: impl Fn(HalfEdge) -> Vec3,
         vertex: usize,
     ) -> Self {
         let origin = Vec3::from(mesh.position[vertex]);
@@ -61,13 +65,11 @@ impl Star {
         let spoke = |i: usize| {
             let (next, previous) = (tangents[(i + 1) % n], tangents[(i + n - 1) % n]);
             let here = end_weights(&tangents[i], &next, &previous, &frame.normal);
-            let slot = first_inner_slot(halves[i].corner() as usize, 1);
-            let start = point(&g0_fit.interior[halves[i].face() as usize], slot);
             Spoke {
                 q1: tangents[i],
                 q2: local(curves[i][2]),
                 c: tangents[i] * (4.0 / 7.0),
-                twist: local(start),
+                twist: local(twist(halves[i])),
                 lambda0: here.lambda0,
                 mu0: here.mu0,
                 lambda1: 1.0 - weights_at_origin(mesh, network, reversed(halves[i])).lambda0,
@@ -80,13 +82,13 @@ impl Star {
 
     /// Normal component of the twist between spokes `i` and `i + 1`:
     /// `7/6 (c_i - o)^T M (c_{i+1} - o)` [derived; TK, App. C prints 2/3, which holds for q1].
-    pub(crate) fn twist_height(&self, i: usize) -> f64 {
+    pub fn twist_height(&self, i: usize) -> f64 {
         let next = &self.spokes[(i + 1) % self.spokes.len()];
         7.0 / 6.0 * apply(&self.shape, &self.spokes[i].c, &next.c)
     }
 
     /// Right-hand side of the row k = 1 of spoke `i`, relative to the vertex [TK, Eq. (16)].
-    pub(crate) fn right_side(&self, i: usize) -> Vec3 {
+    pub fn right_side(&self, i: usize) -> Vec3 {
         let n = self.spokes.len();
         let (s, next) = (&self.spokes[i], &self.spokes[(i + 1) % n]);
         let previous = &self.spokes[(i + n - 1) % n];
@@ -96,7 +98,7 @@ impl Star {
 
     /// Largest residual of the rows k = 1, divided by the mean tangent length; `twists` are
     /// relative to the vertex, in model units.
-    pub(crate) fn residual(&self, twists: &[Vec3], mu1: &[f64]) -> f64 {
+    pub fn residual(&self, twists: &[Vec3], mu1: &[f64]) -> f64 {
         let n = self.spokes.len();
         let row = |i: usize| {
             let s = &self.spokes[i];
@@ -104,5 +106,42 @@ impl Star {
             (6.0 * mixed / self.scale - 4.0 * mu1[i] * s.q1 - self.right_side(i)).norm()
         };
         (0..n).map(row).fold(0.0, f64::max)
+    }
+}
+
+/// Outgoing half-edges of a vertex, counter-clockwise.
+fn spokes(mesh: &BaseMeshView<'_>, vertex: usize) -> impl Iterator<Item = HalfEdge> {
+    let rows = mesh.star_first[vertex] as usize..mesh.star_first[vertex + 1] as usize;
+    let halves = mesh.star[rows].to_vec();
+    debug_assert!(halves.windows(2).all(|h| ccw(mesh, HalfEdge(h[0])).0 == h[1]));
+    halves.into_iter().map(HalfEdge)
+}
+
+/// The tangential and the normal part of a vector in a plane frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Two orthonormal tangents.
+    pub axes: [Vec3; 2],
+    /// Unit normal.
+    pub normal: Vec3,
+}
+
+impl Frame {
+    /// A frame about a unit normal.
+    pub fn about(normal: Vec3) -> Self {
+        // The axis least along the normal keeps the cross product well away from zero.
+        let k = normal.iamin();
+        let e1 = normal.cross(&Vec3::ith(k, 1.0)).normalize();
+        Self { axes: [e1, normal.cross(&e1)], normal }
+    }
+
+    /// Tangential components.
+    pub fn flatten(&self, v: &Vec3) -> [f64; 2] {
+        self.axes.map(|a| a.dot(v))
+    }
+
+    /// The vector with these tangential components and this height.
+    pub fn lift(&self, [x, y]: [f64; 2], height: f64) -> Vec3 {
+        x * self.axes[0] + y * self.axes[1] + height * self.normal
     }
 }
