@@ -189,7 +189,9 @@ mod tests {
     fn written(head: &JournalHead, entries: &[JournalEntry]) -> Vec<u8> {
         let store = MemoryStore::new();
         let mut journal = Journal::begin(&store, "a", head).unwrap();
-        entries.iter().for_each(|e| journal.append(e).unwrap());
+        for entry in entries {
+            journal.append(entry).unwrap();
+        }
         store.read_journal("a").unwrap().unwrap()
     }
 

@@ -5,16 +5,17 @@
 //! when the tasks that write the rows they name have reported. Of all tasks that can begin, those
 //! of the last stage go first: their rows are warm, and little is in flight.
 
+mod decide;
 mod stand;
 
-use crate::driver::{Frame, Wanted, fresh_report};
+use crate::driver::{Frame, Wanted};
 use crate::error::Kept;
 use crate::finisher::{Finished, Finisher};
-use crate::freshness::{Source, assess};
+use crate::freshness::Source;
 use crate::prepare::{Assignment, Planned};
 use crate::workers::{Crew, Job, Notice};
-use crate::{Event, NodeReport, Provenance, Reason, RunError, State, clock, memory};
-use isospline_artifact::{Container, Hashed, Key, SectionSource, StoreError};
+use crate::{Event, NodeReport, Provenance, RunError, clock, memory};
+use isospline_artifact::{Hashed, Key, SectionSource, StoreError};
 use stand::{Figures, Running, Stand, Trust};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -131,72 +132,6 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
         Ok(())
     }
 
-    /// Finds a node fresh or due, unless only the contents of its inputs can tell.
-    ///
-    /// `known` inputs had known contents when it was last looked at.
-    fn decide(&mut self, idx: usize, known: Option<usize>) -> Result<(), RunError> {
-        let frame = self.frame;
-        let node = &frame.nodes[idx];
-        let now = node.inputs.iter().filter(|i| i.content(&self.contents).is_some()).count();
-        if known == Some(now) {
-            return Ok(());
-        }
-        let (state, container) = assess(&frame.pipeline, node, &self.contents)?;
-        let may_run = self.wanted.may_run(idx);
-        let forced = self.wanted.forced[idx] && may_run;
-        self.stands[idx] = match (state, container) {
-            (State::Fresh, Some(container)) if !forced => return self.keep(idx, container),
-            _ if !may_run => Stand::Skipped,
-            (State::Fresh, _) => Stand::Due(vec![Reason::Asked]),
-            (State::Missing, _) => Stand::Due(vec![Reason::Missing]),
-            (State::Damaged(reason), _) => {
-                self.tell_damage(idx, reason);
-                Stand::Due(vec![Reason::Damaged])
-            }
-            (State::Stale(_), _) if forced => Stand::Due(vec![Reason::Asked]),
-            (State::Stale(reasons), _) if self.may_become_fresh(idx, &reasons) => {
-                Stand::Open { known: Some(now) }
-            }
-            (State::Stale(reasons), _) => Stand::Due(reasons),
-        };
-        Ok(())
-    }
-
-    /// Whether all that is against a node is that inputs are not made yet, which will be.
-    fn may_become_fresh(&self, idx: usize, reasons: &[Reason]) -> bool {
-        let comes = |source| match source {
-            Source::Node(node) => !matches!(self.stands[node], Stand::Skipped),
-            Source::Given(..) => true,
-        };
-        reasons.iter().all(|reason| matches!(reason, Reason::Pending { .. }))
-            && self.frame.nodes[idx].inputs.iter().all(|input| comes(input.source))
-    }
-
-    /// Takes a fresh artifact as it is.
-    fn keep(&mut self, idx: usize, container: Container) -> Result<(), RunError> {
-        let container = Arc::new(container);
-        let report = fresh_report(self.frame, idx, &container)?;
-        self.contents[idx] = Some(report.content);
-        self.reports[idx] = Some(report);
-        (self.frame.events)(&Event::Fresh { node: idx, stage: self.frame.label(idx) });
-        self.stands[idx] = Stand::Fresh { container, trust: Trust::Unread };
-        Ok(())
-    }
-
-    fn tell_damage(&self, idx: usize, reason: String) {
-        let stage = self.frame.label(idx);
-        (self.frame.events)(&Event::Damaged { node: idx, stage, reason });
-    }
-
-    /// Has the rows of a fresh artifact read, if they are not already.
-    fn verify(&mut self, idx: usize) {
-        if let Stand::Fresh { container, trust: trust @ Trust::Unread } = &mut self.stands[idx] {
-            *trust = Trust::Reading;
-            let container = Arc::clone(container);
-            self.urgent.push_back(Job::Verify { node: idx, container });
-        }
-    }
-
     /// Gives out the preparation of a node, if its inputs are there or coming.
     fn begin(&mut self, idx: usize) -> Result<(), RunError> {
         let settled = |stand: &Stand<'_>| stand.is_settled();
@@ -287,20 +222,6 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
         }
     }
 
-    fn verified(&mut self, idx: usize, result: Result<(), StoreError>) {
-        self.under_way -= 1;
-        self.stirred = true;
-        match (result, &mut self.stands[idx]) {
-            (Ok(()), Stand::Fresh { trust, .. }) => *trust = Trust::Whole,
-            (Err(StoreError::Damaged { damage, .. }), stand) if self.wanted.only.is_none() => {
-                *stand = Stand::Due(vec![Reason::Damaged]);
-                self.tell_damage(idx, damage.to_string());
-            }
-            (Err(error), _) => self.fail((idx, 0), error.into()),
-            (Ok(()), _) => {}
-        }
-    }
-
     /// Starts the writer of a stage and links its tasks to those that they wait for.
     fn planned(&mut self, planned: Planned<'f>) {
         let (idx, frame) = (planned.active.node, self.frame);
@@ -309,7 +230,9 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
         figures.cost.prepare_seconds = time.as_secs_f64();
         figures.cost.tasks = active.tasks.len();
         figures.cost.resumed_tasks = taken.len();
-        taken.iter().for_each(|(_, counters)| figures.counters.merge(counters));
+        for (_, counters) in &taken {
+            figures.counters.merge(counters);
+        }
         let taken: Vec<usize> = taken.into_iter().map(|(task, _)| task).collect();
         let mut running = Running::new(figures, active, owners, &taken);
         for (source, lists) in awaited {
@@ -439,3 +362,6 @@ fn discard_drafts(frame: &Frame<'_>, stands: &[Stand<'_>]) -> Result<(), StoreEr
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

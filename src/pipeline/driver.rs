@@ -63,13 +63,12 @@ impl<'a> Pipeline<'a> {
         let wanted = Wanted::of(self, options)?;
         let pool = Threads::new(options.threads.max(1));
         let frame = Frame { pipeline: *self, nodes, scene, options: *options, events, pool };
-        let reports = match all_fresh(&frame, &wanted)? {
-            Some(reports) => reports,
-            None => {
-                // What another process made meanwhile is looked at again under the lock.
-                let _lock = self.store.lock()?;
-                std::thread::scope(|scope| Dataflow::start(&frame, scope, wanted)?.run())?
-            }
+        let reports = if let Some(reports) = all_fresh(&frame, &wanted)? {
+            reports
+        } else {
+            // What another process made meanwhile is looked at again under the lock.
+            let _lock = self.store.lock()?;
+            std::thread::scope(|scope| Dataflow::start(&frame, scope, wanted)?.run())?
         };
         let nodes = reports.into_iter().flatten().collect();
         Ok(RunReport { nodes, seconds: start.elapsed().as_secs_f64() })

@@ -41,7 +41,7 @@ pub(crate) struct Planned<'f> {
 impl Assignment {
     /// Does it and tells what came of it.
     pub(crate) fn carry_out<'f>(
-        self: Box<Self>,
+        self,
         frame: &'f Frame<'f>,
         lane: Lane<'_>,
         notices: &Sender<Notice<'f>>,

@@ -78,25 +78,26 @@ mod tests {
         RowOwners::of(&SPECS, &[task(4..8, 0..3), task(0..4, 3..3), task(8..10, 3..9)])
     }
 
-    fn awaited(section: &'static str, rows: &[Range<usize>]) -> Vec<u32> {
-        let need = |input| Need { input, section, rows: rows.to_vec() };
+    fn awaited(section: &'static str, rows: &[(usize, usize)]) -> Vec<u32> {
+        let rows: Vec<Range<usize>> = rows.iter().map(|&(start, end)| start..end).collect();
+        let need = |input| Need { input, section, rows: rows.clone() };
         let task = Task { writes: Vec::new(), needs: vec![need(1), need(0)] };
         source().awaited(&[task], 1).remove(0)
     }
 
     #[test]
     fn every_owner_of_a_named_row_is_awaited_once() {
-        assert_eq!(awaited("a", &[0..1, 2..4]), [1]);
-        assert_eq!(awaited("a", &[3..5]), [1, 0]);
-        assert_eq!(awaited("a", &[0..1, 7..8, 9..10]), [1, 0, 2]);
-        assert_eq!(awaited("a", &[0..10]), [1, 0, 2]);
-        assert_eq!(awaited("b", &[2..4, 5..6]), [0, 2]);
+        assert_eq!(awaited("a", &[(0, 1), (2, 4)]), [1]);
+        assert_eq!(awaited("a", &[(3, 5)]), [1, 0]);
+        assert_eq!(awaited("a", &[(0, 1), (7, 8), (9, 10)]), [1, 0, 2]);
+        assert_eq!(awaited("a", &[(0, 10)]), [1, 0, 2]);
+        assert_eq!(awaited("b", &[(2, 4), (5, 6)]), [0, 2]);
         assert_eq!(awaited("b", &[]), [0; 0]);
     }
 
     #[test]
     fn an_unknown_section_waits_for_all_tasks() {
-        assert_eq!(awaited("c", &[0..1]), [0, 1, 2]);
+        assert_eq!(awaited("c", &[(0, 1)]), [0, 1, 2]);
     }
 
     #[test]
@@ -107,6 +108,7 @@ mod tests {
             let mut expected: Vec<u32> = rows.iter().map(|&row| owner(row)).collect();
             expected.dedup();
             let ranges = isospline_stage::plan::ranges(rows);
+            let ranges: Vec<_> = ranges.into_iter().map(|rows| (rows.start, rows.end)).collect();
             assert_eq!(awaited("a", &ranges), expected, "{ranges:?}");
         }
     }

@@ -1,4 +1,6 @@
-//! Three small stages, a graph of them, and a store that fails on purpose.
+//! Small stages, graphs of them, and what tests ask of a run.
+
+mod mix;
 
 use crate::{
     Event, Graph, ModelKey, Node, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
@@ -263,7 +265,8 @@ pub(crate) const FILES: [&str; 3] = ["01-seed.isos", "02-blend.isos", "03-fit.is
 
 impl Bench {
     pub(crate) fn new() -> Self {
-        let registry = Registry::new().with::<Seed>().with::<Blend>().with::<Fit>();
+        let registry =
+            Registry::new().with::<Seed>().with::<Blend>().with::<Fit>().with::<mix::Mix>();
         let mut graph = Graph::default();
         let seed = graph.push(Node::new("seed"));
         let blend = graph.push(Node::new("blend").reading([seed]));
@@ -271,6 +274,13 @@ impl Bench {
         let content = [("formula", "x^2 - 1"), ("level", "0")];
         let content = content.map(|(k, v)| (k.to_owned(), v.to_owned())).into();
         Self { registry, graph, model: ModelKey { name: "toy".into(), content, hashable: true } }
+    }
+
+    /// A fourth stage, which reads rows all over the second and the third.
+    pub(crate) fn long() -> Self {
+        let mut bench = Self::new();
+        bench.graph.push(Node::new("mix").reading([0, 1, 2]));
+        bench
     }
 
     pub(crate) fn set(mut self, stage: &str, params: Value) -> Self {

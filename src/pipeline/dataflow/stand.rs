@@ -120,7 +120,9 @@ impl<'f> Running<'f> {
     ) -> Self {
         let n = active.tasks.len();
         let mut committed = vec![false; n];
-        taken.iter().for_each(|&task| committed[task] = true);
+        for &task in taken {
+            committed[task] = true;
+        }
         Self {
             figures,
             active,
