@@ -93,8 +93,8 @@ impl Store for FolderStore {
         Ok(Some(Box::new(growing)))
     }
 
-    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
-        read_if_there(&self.draft(name, PARTIAL))
+    fn read_partial(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
+        mapped(&self.draft(name, PARTIAL))
     }
 
     fn journal(&self, name: &str, keep: u64) -> Result<Box<dyn Log>, StoreError> {
@@ -125,13 +125,7 @@ impl Store for FolderStore {
     }
 
     fn read(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
-        let path = self.path(name);
-        let file = match File::open(&path) {
-            Ok(file) => file,
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(StoreError::io("open", path)(e)),
-        };
-        Ok(Some(Arc::new(map(&file, &path)?)))
+        mapped(&self.path(name))
     }
 
     fn write_note(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
@@ -190,6 +184,15 @@ impl FolderStore {
         };
         Growing { file, draft, map: None }
     }
+}
+
+fn mapped(path: &Path) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(StoreError::io("open", path)(e)),
+    };
+    Ok(Some(Arc::new(map(&file, path)?)))
 }
 
 fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {

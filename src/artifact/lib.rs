@@ -6,6 +6,7 @@
 mod cells;
 pub mod commit;
 pub mod container;
+pub mod draft;
 pub mod error;
 pub mod folder;
 pub mod header;
@@ -20,6 +21,7 @@ pub mod writer;
 
 pub use commit::write_file_atomic;
 pub use container::Container;
+pub use draft::Draft;
 pub use error::{Damage, StoreError};
 pub use folder::FolderStore;
 pub use header::Header;

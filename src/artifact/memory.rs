@@ -61,12 +61,12 @@ impl Store for MemoryStore {
 
     fn reopen(&self, name: &str, length: u64) -> Result<Option<Box<dyn Partial>>, StoreError> {
         // A copy: the writer that left the file may still be alive in this process.
-        let found = self.read_partial(name)?.filter(|bytes| bytes.len() as u64 == length);
-        Ok(found.map(|bytes| self.growing(name, Cells::copy_of(&bytes), true)))
+        let found = self.read_partial(name)?.filter(|found| found.bytes().len() as u64 == length);
+        Ok(found.map(|found| self.growing(name, Cells::copy_of(found.bytes()), true)))
     }
 
-    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
-        Ok(self.shelf().partials.get(name).map(|cells| cells.bytes().to_vec()))
+    fn read_partial(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
+        Ok(self.shelf().partials.get(name).map(|cells| Arc::clone(cells) as Arc<dyn Bytes>))
     }
 
     fn journal(&self, name: &str, keep: u64) -> Result<Box<dyn Log>, StoreError> {

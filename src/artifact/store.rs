@@ -106,7 +106,7 @@ pub trait Store: Send + Sync + Debug {
     ///
     /// # Errors
     /// [`StoreError::Io`].
-    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError>;
+    fn read_partial(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError>;
 
     /// Opens the journal of an unfinished file after its first `keep` bytes; makes one where
     /// there is none.

@@ -3,7 +3,7 @@
 use crate::clock;
 use crate::dataflow::Dataflow;
 use crate::erase::Failure;
-use crate::freshness::{Resolved, assess, resolve};
+use crate::freshness::{Resolved, assess, begun, resolve};
 use crate::host::{Listener, Threads};
 use crate::workers::TaskFailure;
 use crate::{
@@ -39,8 +39,9 @@ impl<'a> Pipeline<'a> {
         for (node, resolved) in nodes.iter().enumerate() {
             let (state, container) = assess(self, resolved, &contents)?;
             contents[node] = container.map(|c| c.content());
+            let begun = begun(self, resolved)?;
             let (stage, artifact) = (resolved.label.clone(), resolved.artifact.clone());
-            out.push(NodeStatus { node, stage, artifact, state });
+            out.push(NodeStatus { node, stage, artifact, state, begun });
         }
         Ok(out)
     }

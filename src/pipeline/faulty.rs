@@ -67,7 +67,7 @@ impl Store for FaultyStore {
         Ok(inner.map(|inner| Box::new(self.faulty(name, inner)) as Box<dyn Partial>))
     }
 
-    fn read_partial(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
+    fn read_partial(&self, name: &str) -> Result<Option<Arc<dyn Bytes>>, StoreError> {
         self.fuse.burn("read", name)?;
         self.inner.read_partial(name)
     }

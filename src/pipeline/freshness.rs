@@ -3,7 +3,7 @@
 use crate::keys::{Ingredient, changes, ingredients, key_of};
 use crate::provenance::InputRecord;
 use crate::{Pipeline, Reason, RunError, StageInfo, read_provenance};
-use isospline_artifact::{Container, Identity, Key, StoreError};
+use isospline_artifact::{Container, Draft, Identity, Key, StoreError};
 use std::fmt;
 
 /// Whether a node's artifact can be used.
@@ -30,6 +30,19 @@ pub struct NodeStatus {
     pub artifact: String,
     /// Its state.
     pub state: State,
+    /// What an earlier run left unfinished of it.
+    pub begun: Option<Begun>,
+}
+
+/// An unfinished artifact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Begun {
+    /// Tasks done.
+    pub done: usize,
+    /// All tasks.
+    pub of: usize,
+    /// Whether the next run goes on with it; it was begun with something else otherwise.
+    pub usable: bool,
 }
 
 impl fmt::Display for NodeStatus {
@@ -42,8 +55,28 @@ impl fmt::Display for NodeStatus {
             }
             State::Missing => write!(f, "{} is missing", self.stage),
             State::Damaged(damage) => write!(f, "{} is damaged: {damage}", self.stage),
-        }
+        }?;
+        self.begun.map_or(Ok(()), |begun| write!(f, "; {begun}"))
     }
+}
+
+impl fmt::Display for Begun {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { done, of, usable } = self;
+        let use_of_it = if *usable { "" } else { " of something else" };
+        write!(f, "{done} of {of} tasks{use_of_it} are done")
+    }
+}
+
+/// What an earlier run left of a node that is not fresh.
+pub(crate) fn begun(pipeline: &Pipeline<'_>, node: &Resolved) -> Result<Option<Begun>, StoreError> {
+    let draft = Draft::read(pipeline.store, &node.artifact)?;
+    Ok(draft.and_then(|draft| {
+        let (done, of) = draft.tasks()?;
+        let recipe = draft.recorded?.head.recipe;
+        let usable = recipe == node.recipe && pipeline.model.hashable;
+        Some(Begun { done, of, usable })
+    }))
 }
 
 /// A node with all that is known of it before anything runs.

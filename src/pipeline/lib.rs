@@ -35,7 +35,7 @@ mod workers;
 pub use driver::Pipeline;
 pub use error::{GraphError, Kept, ParamsError, RunError, StageFailure};
 pub use event::Event;
-pub use freshness::{NodeStatus, State};
+pub use freshness::{Begun, NodeStatus, State};
 pub use graph::{Given, Graph, ModelKey, Node};
 pub use host::Threads;
 pub use keys::Reason;

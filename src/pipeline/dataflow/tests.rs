@@ -164,7 +164,7 @@ fn rows_that_did_not_reach_the_disk_are_made_again() {
     let store = MemoryStore::new();
     let kept = stopped_after(5, &bench, &store, options(1, 10));
     let name = FILES[1];
-    let file = store.read_partial(name).unwrap().unwrap();
+    let file = store.read_partial(name).unwrap().unwrap().bytes().to_vec();
     // In a row of a task that is done: all others are zero.
     let place = file.iter().rposition(|&byte| byte != 0).unwrap();
     let mut partial = store.reopen(name, file.len() as u64).unwrap().unwrap();
@@ -199,6 +199,20 @@ fn what_was_begun_otherwise_is_discarded_with_a_reason() {
     drop(store.journal(FILES[1], 20).unwrap());
     let reasons = discarded(&Bench::long(), &store, &options(1, 10));
     assert_eq!(reasons[0], "blend: its journal is damaged");
+}
+
+#[test]
+fn the_status_tells_what_is_begun() {
+    let store = MemoryStore::new();
+    let kept = stopped_after(5, &Bench::new(), &store, options(1, 10));
+    let status = |bench: &Bench| bench.pipeline(&store).status().unwrap();
+    let begun: Vec<_> = status(&Bench::new()).iter().filter_map(|n| n.begun).collect();
+    assert_eq!(begun.iter().map(|b| b.done).sum::<usize>(), kept);
+    let done = begun[0].done;
+    let text = format!("blend is missing; {done} of 10 tasks are done");
+    assert_eq!(status(&Bench::new())[1].to_string(), text);
+    let text = format!("blend is missing; {done} of 10 tasks of something else are done");
+    assert_eq!(status(&Bench::new().set("blend", json!({"samples": 2})))[1].to_string(), text);
 }
 
 #[test]
