@@ -1,7 +1,7 @@
 //! The formats, and the one function that writes them all.
 
 use crate::tessellation::Tessellation;
-use crate::{ExportError, glb, npz, obj, ply, stl, vtu};
+use crate::{About, ExportError, StepOptions, glb, npz, obj, ply, step, stl, vtu};
 use isospline_artifact::kinds::PatchesView;
 use isospline_geometry::bezier_triangle::DEGREE;
 use std::fmt;
@@ -15,6 +15,8 @@ pub enum Format {
     Npz,
     /// VTK unstructured grid of degree-7 Bézier triangles. Exact.
     Vtu,
+    /// ISO 10303 solids of polynomial patches. Exact.
+    Step,
     /// Binary glTF: triangle mesh with normals and a material, f32.
     Glb,
     /// Wavefront text: triangle mesh with normals, shortest decimals that give back every bit.
@@ -26,16 +28,20 @@ pub enum Format {
 }
 
 /// What may be chosen about an export.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Steps a side of each patch in triangle meshes, 1 ..= 256; default 8. Exact formats ignore
     /// it.
     pub samples: u32,
+    /// Name, unit and origin, for the formats that have a place for them.
+    pub about: About,
+    /// Of STEP files.
+    pub step: StepOptions,
 }
 
 /// No format has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown format {name:?}; formats are npz, vtu, glb, obj, ply, stl")]
+#[error("unknown format {name:?}; formats are npz, vtu, step, glb, obj, ply, stl")]
 pub struct UnknownFormat {
     /// The name given.
     pub name: String,
@@ -57,6 +63,7 @@ pub fn write(
     match format {
         Format::Npz => npz::write(patches, &mut out)?,
         Format::Vtu => vtu::write(patches, &mut out)?,
+        Format::Step => step::write(patches, options, &mut out)?,
         Format::Glb => glb::write(&sampled()?, &mut out)?,
         Format::Obj => obj::write(&sampled()?, &mut out)?,
         Format::Ply => ply::write(&sampled()?, &mut out)?,
@@ -68,13 +75,15 @@ pub fn write(
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 6] = [Self::Npz, Self::Vtu, Self::Glb, Self::Obj, Self::Ply, Self::Stl];
+    pub const ALL: [Self; 7] =
+        [Self::Npz, Self::Vtu, Self::Step, Self::Glb, Self::Obj, Self::Ply, Self::Stl];
 
     /// Name, which is also the file extension.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Npz => "npz",
             Self::Vtu => "vtu",
+            Self::Step => "step",
             Self::Glb => "glb",
             Self::Obj => "obj",
             Self::Ply => "ply",
@@ -104,7 +113,7 @@ impl fmt::Display for Format {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 8 }
+        Self { samples: 8, about: About::default(), step: StepOptions::default() }
     }
 }
 
@@ -140,7 +149,8 @@ mod tests {
     fn bytes(format: Format) -> Vec<u8> {
         let patches = sample::ball_and_ring();
         let mut out = Vec::new();
-        write(format, &patches.view(), &Options { samples: 3 }, &mut out).unwrap();
+        write(format, &patches.view(), &Options { samples: 3, ..Options::default() }, &mut out)
+            .unwrap();
         out
     }
 
@@ -178,8 +188,12 @@ mod tests {
         let patches = sample::ball_and_ring();
         for format in Format::ALL {
             for space in [0, bytes(format).len() - 1] {
-                let done =
-                    write(format, &patches.view(), &Options { samples: 3 }, &mut Full(space));
+                let done = write(
+                    format,
+                    &patches.view(),
+                    &Options { samples: 3, ..Options::default() },
+                    &mut Full(space),
+                );
                 let refused = done.unwrap_err();
                 assert!(matches!(refused, ExportError::Io(_)), "{format}: {refused}");
             }
@@ -206,7 +220,12 @@ mod tests {
     fn samples_out_of_range_are_refused() {
         let patches = sample::ball_and_ring();
         for samples in [0, 257] {
-            let done = write(Format::Stl, &patches.view(), &Options { samples }, &mut Vec::new());
+            let done = write(
+                Format::Stl,
+                &patches.view(),
+                &Options { samples, ..Options::default() },
+                &mut Vec::new(),
+            );
             assert!(done.unwrap_err().to_string().contains("samples"));
         }
     }

@@ -1,18 +1,23 @@
 //! Finished patches become files that other programs read, one module a format.
 //!
-//! Exact formats (npz, vtu) carry the control points themselves, f64; the others a triangle mesh
+//! Exact formats (npz, vtu, step) carry the control points themselves, f64; the others a triangle mesh
 //! sampled from the patches. In every format the points on a shared edge are made once, from data
 //! that both faces name by id: files are closed by construction, and equal surfaces give equal
 //! bytes. Writers stream; they hold one face and a few words an edge.
 
+mod about;
 mod error;
 mod file;
 mod format;
 mod glb;
+mod mass;
 mod npz;
 mod npz_reader;
 mod obj;
 mod ply;
+mod quads;
+mod solids;
+mod step;
 mod stl;
 mod tessellation;
 mod vtu;
@@ -21,7 +26,9 @@ mod zip_archive;
 #[cfg(test)]
 mod sample;
 
+pub use about::{About, LengthUnit};
 pub use error::ExportError;
 pub use file::{read_npz_file, write_file};
 pub use format::{Format, Options, UnknownFormat, write};
 pub use npz_reader::{NpzError, NpzSurface, read_npz};
+pub use step::{StepOptions, StepSchema};

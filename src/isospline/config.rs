@@ -3,11 +3,13 @@
 mod canonical;
 mod document;
 mod error;
+mod foreign;
 mod model_file;
 mod stage_params;
 mod tables;
 
 pub use document::{Document, Place, Source};
 pub use error::ConfigError;
+pub use foreign::foreign_as_toml;
 pub use model_file::{DEFAULT_FACES, Domain, Inside, ModelFile, ModelTable, TargetTable};
 pub use stage_params::StageParams;

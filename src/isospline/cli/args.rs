@@ -42,16 +42,19 @@ pub(crate) enum Command {
     /// Run one stage alone; what it reads must be fresh
     #[command(after_help = STAGE_EXAMPLES)]
     Stage(StageArgs),
-    /// Say of every stage of a model folder whether it is fresh, stale (and why) or missing
-    #[command(after_help = "Example:\n  isospline status out/deccube")]
+    /// Say of every stage of a model folder whether it is fresh, stale (and why), begun or missing
+    #[command(after_help = STATUS_EXAMPLES)]
     Status {
         /// The model folder
         dir: PathBuf,
+        /// Print one JSON value a stage
+        #[arg(long)]
+        json: bool,
     },
-    /// Print what an artifact holds: kind, keys, sections, counters
+    /// Print what an artifact holds, finished or not: kind, keys, sections, tasks, counters
     #[command(after_help = INSPECT_EXAMPLES)]
     Inspect {
-        /// An artifact (.isos)
+        /// An artifact (.isos), or what there is of it (.isos.partial)
         file: PathBuf,
         /// Verify the checksums of all rows
         #[arg(long)]
@@ -71,14 +74,23 @@ Examples:
   isospline run configs/torus.toml --set target.faces=1000 --out out/torus_1000
   isospline run --formula \"x^2 + y^2 + z^2 - 1\" --set target.faces=100
   isospline run configs/chair.toml --from network --json
+  isospline run configs/deccube.toml --trace deccube.trace.json
 
 The folder is out/<model name>. A second run with nothing changed does nothing; after a change
-only the stages that depend on it run again.";
+only the stages that depend on it run again. A run that was stopped or killed in the middle of a
+stage goes on there.";
 
 const STAGE_EXAMPLES: &str = "\
 Examples:
   isospline stage polygonize configs/deccube.toml
   isospline stage network configs/deccube.toml --set network.samples=24";
+
+const STATUS_EXAMPLES: &str = "\
+Examples:
+  isospline status out/deccube
+  isospline status out/deccube --json
+
+On a terminal it is a table; elsewhere a sentence a stage.";
 
 const INSPECT_EXAMPLES: &str = "\
 Examples:
@@ -97,9 +109,10 @@ const EXPORT_EXAMPLES: &str = "\
 Examples:
   isospline export out/deccube --format glb
   isospline export out/deccube --format vtu -o deccube.vtu
+  isospline export out/deccube --format step --compact
   isospline export out/deccube --format stl --samples 16
 
-vtu and npz hold the patches exactly; glb, obj, ply and stl hold triangles.";
+vtu, npz and step hold the patches exactly, step as closed solids; glb, obj, ply and stl hold triangles.";
 
 /// Which model, and how to run it.
 #[derive(Debug, Args)]
@@ -134,6 +147,12 @@ pub(crate) struct RunArgs {
     /// Run this stage and all after it even if they are fresh
     #[arg(long, value_name = "STAGE")]
     pub(crate) from: Option<String>,
+    /// Compare all rows of fresh artifacts with their checksums too, and make damaged ones again
+    #[arg(long)]
+    pub(crate) verify: bool,
+    /// Write who did what when, to be opened in chrome://tracing or ui.perfetto.dev
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trace: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -170,6 +189,24 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "N", default_value_t = 8,
         value_parser = clap::value_parser!(u32).range(1..=256))]
     pub(crate) samples: u32,
+    /// STEP: one patch a triangle with a collapsed side in place of three quads
+    #[arg(long)]
+    pub(crate) compact: bool,
+    /// STEP: curves in the parameters of the faces too
+    #[arg(long)]
+    pub(crate) pcurves: bool,
+    /// STEP: the application protocol
+    #[arg(long, value_enum, default_value = "ap242")]
+    pub(crate) schema: SchemaArg,
+}
+
+/// Application protocols of STEP files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum SchemaArg {
+    /// Managed model based 3D engineering
+    Ap242,
+    /// Automotive design
+    Ap214,
 }
 
 /// Formats of `export`.
@@ -177,6 +214,8 @@ pub(crate) struct ExportArgs {
 pub(crate) enum FormatArg {
     /// VTK unstructured grid with exact Bézier cells
     Vtu,
+    /// STEP solids of exact patches, for CAD programs
+    Step,
     /// Binary glTF, to look at
     Glb,
     /// Wavefront OBJ

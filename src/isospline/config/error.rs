@@ -1,6 +1,7 @@
 //! What can be wrong with a model file.
 
 use crate::config::Place;
+use isospline_implicit::ForeignError;
 use std::path::PathBuf;
 
 /// Why a model file or an override is refused.
@@ -19,6 +20,14 @@ pub enum ConfigError {
     Syntax {
         /// The parser's sentence.
         message: String,
+        /// Where.
+        place: Place,
+    },
+    /// A model file of another program is not what its format asks for.
+    #[error("{error}")]
+    Foreign {
+        /// What is wrong with it.
+        error: Box<ForeignError>,
         /// Where.
         place: Place,
     },
@@ -94,7 +103,7 @@ impl ConfigError {
     /// Where it is seen, if in a text.
     pub fn place(&self) -> Option<&Place> {
         match self {
-            Self::Syntax { place, .. } => Some(place),
+            Self::Syntax { place, .. } | Self::Foreign { place, .. } => Some(place),
             Self::UnknownKey { place, .. }
             | Self::WrongType { place, .. }
             | Self::OutOfRange { place, .. }
@@ -109,6 +118,7 @@ impl ConfigError {
         match self {
             Self::Read { .. } => "model-file-unreadable",
             Self::Syntax { .. } => "toml-syntax",
+            Self::Foreign { .. } => "foreign-syntax",
             Self::Override { .. } => "bad-override",
             Self::UnknownKey { .. } => "unknown-key",
             Self::WrongType { .. } => "wrong-type",
@@ -124,6 +134,7 @@ impl ConfigError {
         match self {
             Self::Read { .. } => "give the path of a model file, or --formula \"...\"".to_owned(),
             Self::Syntax { .. } => "strings need quotes; see configs/reference.toml".to_owned(),
+            Self::Foreign { .. } => "mend the line, or write the model as TOML".to_owned(),
             Self::Override { .. } => {
                 "write --set TABLE.KEY=VALUE, such as --set target.faces=2000".to_owned()
             }

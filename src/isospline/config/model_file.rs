@@ -1,10 +1,11 @@
 //! The model file: what surface, how many faces, what passes, and the parameters of the stages.
 
 use crate::config::tables::{out_of_range, refuse_unknown_tables, typed};
-use crate::config::{ConfigError, Document, StageParams};
+use crate::config::{ConfigError, Document, StageParams, foreign_as_toml};
 use isospline_check::CheckParams;
+use isospline_export::LengthUnit;
 use isospline_geometry::{Aabb, Vec3};
-use isospline_implicit::Formula;
+use isospline_implicit::{ForeignFormat, Formula};
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -67,8 +68,8 @@ pub struct ModelTable {
     pub inside: Inside,
     /// An OBJ file that takes the place of polygonize and decimate, relative to the model file.
     pub base_mesh: Option<PathBuf>,
-    /// Unit of length, passed on to formats that name one.
-    pub unit: Option<String>,
+    /// Unit of length, passed on to formats that name one; millimetres where absent.
+    pub unit: Option<LengthUnit>,
 }
 
 /// Far beyond what a modeller's box has, near enough to be searched in milliseconds.
@@ -126,14 +127,22 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
-    /// Reads a model file and applies `overrides` (`KEY=VALUE`).
+    /// Reads a model file, of this program or a [`ForeignFormat`], and applies `overrides`
+    /// (`KEY=VALUE`).
     ///
     /// # Errors
     /// The first thing that is wrong with the file or an override.
     pub fn open(path: &Path, overrides: &[String]) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
-        let mut doc = Document::parse(&path.display().to_string(), &text)?;
+        let name = path.display().to_string();
+        let mut doc = match ForeignFormat::of(path) {
+            None => Document::parse(&name, &text)?,
+            Some(format) => Document::parse(
+                &format!("{name}, as TOML"),
+                &foreign_as_toml(path, format, &text)?,
+            )?,
+        };
         overrides.iter().try_for_each(|argument| doc.set(argument))?;
         let mut file = Self::from_document(&doc)?;
         if file.model.name.is_empty() {
