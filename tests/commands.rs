@@ -112,6 +112,8 @@ fn a_folder_is_checked_without_its_model_file() {
         "gap_max",
         "g1_angle_deg_max",
         "g1_angle_deg_p99",
+        "curvature_jump_median",
+        "curvature_jump_p99",
         "rel_error_max",
         "rel_error_rms",
         "normal_error_deg_max",

@@ -1,6 +1,7 @@
 //! The whole check, figure by figure.
 
 use crate::continuity::{self, Continuity};
+use crate::curvature::{self, CurvatureJump};
 use crate::distance::{self, Distance, first_order};
 use crate::lent_threads::{ForEach, map};
 use crate::params::{CheckParams, Expected};
@@ -55,6 +56,7 @@ fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
     let distance = distance::measure(surface, field, for_each);
     let parts = Parts {
         continuity: continuity::measure(surface, &topology, for_each),
+        curvature: curvature::measure(surface, &topology, for_each),
         worst: foot::largest(surface, field, &distance),
         weights: sector::measure(surface, &topology, &normals),
         off_surface: at_vertices.iter().fold(0.0, |acc, jet| worse(acc, first_order(jet))),
@@ -71,6 +73,7 @@ fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
 struct Parts {
     topology: Topology,
     continuity: Continuity,
+    curvature: CurvatureJump,
     distance: Distance,
     worst: Option<(f64, Place)>,
     weights: Weights,
@@ -82,7 +85,7 @@ struct Parts {
 impl Parts {
     /// The figures, relative where the report wants them so; no verdict yet.
     fn report(self, job: &Job<'_>) -> CheckReport {
-        let Self { topology, continuity, distance, worst, weights, .. } = self;
+        let Self { topology, continuity, curvature, distance, worst, weights, .. } = self;
         let surface = job.surface;
         let diagonal = surface.diagonal();
         CheckReport {
@@ -98,6 +101,8 @@ impl Parts {
             shared_bits_differ: continuity.bits_differ,
             g1_angle_deg_max: continuity.angle_deg_max,
             g1_angle_deg_p99: continuity.angle_deg_p99,
+            curvature_jump_median: curvature.median,
+            curvature_jump_p99: curvature.p99,
             rel_error_max: worst.map_or(f64::NAN, |(d, _)| d / diagonal),
             rel_error_grid_max: distance.max / diagonal,
             rel_error_rms: distance.rms / diagonal,

@@ -7,6 +7,7 @@
 
 mod checker;
 mod continuity;
+mod curvature;
 mod distance;
 mod evaluate;
 mod foot;

@@ -35,6 +35,11 @@ pub struct CheckReport {
     pub g1_angle_deg_max: f64,
     /// 99th percentile over edges of the largest angle of each.
     pub g1_angle_deg_p99: f64,
+    /// Median over edges of the largest jump of normal curvature across each, over the largest
+    /// curvature there and `1e-3 / diagonal`; along the direction normal to the edge.
+    pub curvature_jump_median: f64,
+    /// 99th percentile of the same.
+    pub curvature_jump_p99: f64,
     /// Largest distance from the surface: local maximum sought, confirmed by its foot point.
     pub rel_error_max: f64,
     /// Largest first-order distance `|f| / |grad f|` on the sample grid.

@@ -71,6 +71,8 @@ fn unlimited(out: &mut Vec<String>, report: &CheckReport) {
     let figures = [
         ("diagonal", report.diagonal),
         ("g1_angle_deg_p99", report.g1_angle_deg_p99),
+        ("curvature_jump_median", report.curvature_jump_median),
+        ("curvature_jump_p99", report.curvature_jump_p99),
         ("rel_error_grid_max", report.rel_error_grid_max),
         ("rel_error_rms", report.rel_error_rms),
         ("rel_error_mean", report.rel_error_mean),
