@@ -24,13 +24,13 @@ pub struct NetworkParams {
     pub samples: u32,
     /// Samples of the normal distance a curve, 6 to 32, default 12; `normal` only.
     pub normal_samples: u32,
-    /// Evaluations of the field along a curve at most, 1 to 200, default 30; `normal` only.
+    /// Evaluations of the field along a curve at most, of each of two starts, 1 to 200, default 40; `normal` only.
     pub iterations: u32,
 }
 
 impl Default for NetworkParams {
     fn default() -> Self {
-        Self { method: Method::Paper, samples: 17, normal_samples: 12, iterations: 30 }
+        Self { method: Method::Paper, samples: 17, normal_samples: 12, iterations: 40 }
     }
 }
 

@@ -5,8 +5,9 @@ use isospline_geometry::Vec3;
 /// Largest turn of a tangent, radians: 20 degrees.
 const MAX_TURN: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Part of a sector, and of what it lacks to a straight angle, that one of its two edges may take:
-/// both together leave a third.
-const SHARE: f64 = 1.0 / 3.0;
+/// both together leave a tenth. A third each costs meshes of decimation a factor of 3 to 7 in the
+/// worst curve (double torus of 1800 faces, chair of 4000); without a bound sectors close.
+const SHARE: f64 = 0.45;
 
 /// Range of the tangent of the angle between chord and curve as they leave a vertex, both seen in
 /// its tangent plane; positive counter-clockwise from outside.
@@ -22,7 +23,7 @@ impl Slant {
     /// The range for an edge that leaves a vertex of this `normal` along `chord`, between edges
     /// along `ccw` and `cw`.
     ///
-    /// Each sector keeps a third of its angle and of what it lacks to 180 degrees, whatever the
+    /// Each sector keeps a tenth of its angle and of what it lacks to 180 degrees, whatever the
     /// neighbours do, so `lambda0` stays in (0, 1). An edge beside a sector out of (0, 180) degrees
     /// may only turn to mend it.
     pub fn between(chord: &Vec3, ccw: &Vec3, cw: &Vec3, normal: &Vec3) -> Self {
@@ -61,8 +62,8 @@ mod tests {
             assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-9), "{found:?}");
         };
         close(range_deg(60.0, -60.0), [-20.0, 20.0]);
-        close(range_deg(30.0, -90.0), [-20.0, 10.0]);
-        close(range_deg(60.0, -174.0), [-20.0, 2.0]);
+        close(range_deg(30.0, -90.0), [-20.0, 13.5]);
+        close(range_deg(60.0, -174.0), [-20.0, 2.7]);
         close(range_deg(200.0, -60.0), [0.0, 20.0]);
     }
 }
