@@ -1,6 +1,6 @@
 //! What a scalar field answers.
 
-use crate::{Interval, IntervalJet};
+use crate::{Interval, IntervalBend, IntervalJet};
 use isospline_geometry::{Mat3, Vec3};
 use std::sync::Arc;
 
@@ -66,6 +66,15 @@ pub trait Field: Send + Sync {
         for (out, &domain) in out.iter_mut().zip(domains) {
             *out = self.gradient_enclosure(domain);
         }
+    }
+
+    /// Enclosures of the second derivatives over many boxes, with value and gradient in their
+    /// middles: `grad f(x)` lies in `middle + hessian (x - c)` for x in the box around c. `None`
+    /// where that is not known: for fields without intervals, with kinks, or too long to be worth
+    /// it.
+    fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {
+        assert_eq!(domains.len(), out.len(), "one result a box");
+        out.fill(None);
     }
 
     /// Enclosure of the value over a box: the better of [`Field::value_enclosure`] and the mean
@@ -155,10 +164,7 @@ impl<F: Field> Field for Oriented<F> {
     }
 
     fn gradient_enclosure(&self, domain: [Interval; 3]) -> Option<IntervalJet> {
-        self.inner.gradient_enclosure(domain).map(|jet| IntervalJet {
-            value: self.turn(jet.value.minus(self.level)),
-            gradient: jet.gradient.map(|g| self.turn(g)),
-        })
+        self.inner.gradient_enclosure(domain).map(|jet| self.turned(jet))
     }
 
     fn value_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<Interval>]) {
@@ -171,8 +177,15 @@ impl<F: Field> Field for Oriented<F> {
     fn gradient_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalJet>]) {
         self.inner.gradient_enclosures(domains, out);
         for jet in out.iter_mut().flatten() {
-            jet.value = self.turn(jet.value.minus(self.level));
-            jet.gradient = jet.gradient.map(|g| self.turn(g));
+            *jet = self.turned(*jet);
+        }
+    }
+
+    fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {
+        self.inner.bend_enclosures(domains, out);
+        for bend in out.iter_mut().flatten() {
+            bend.middle = self.turned(bend.middle);
+            bend.hessian = bend.hessian.map(|h| self.turn(h));
         }
     }
 }
@@ -180,6 +193,13 @@ impl<F: Field> Field for Oriented<F> {
 impl<F> Oriented<F> {
     fn turn(&self, i: Interval) -> Interval {
         if self.flipped { Interval { lo: -i.hi, hi: -i.lo } } else { i }
+    }
+
+    fn turned(&self, jet: IntervalJet) -> IntervalJet {
+        IntervalJet {
+            value: self.turn(jet.value.minus(self.level)),
+            gradient: jet.gradient.map(|g| self.turn(g)),
+        }
     }
 }
 
@@ -211,6 +231,13 @@ macro_rules! forward_field {
                 out: &mut [Option<IntervalJet>],
             ) {
                 (**self).gradient_enclosures(domains, out);
+            }
+            fn bend_enclosures(
+                &self,
+                domains: &[[Interval; 3]],
+                out: &mut [Option<IntervalBend>],
+            ) {
+                (**self).bend_enclosures(domains, out);
             }
         }
     )*};

@@ -33,7 +33,7 @@ use crate::interval_evaluator::enclose;
 use crate::interval_lanes::enclose_all;
 use crate::lowering::{self, Target};
 use crate::tape::Tape;
-use crate::{Field, Interval, IntervalJet, Jet1, Jet2};
+use crate::{Field, Interval, IntervalBend, IntervalJet, Jet1, Jet2};
 use crate::{canonical, derivative, parser};
 use isospline_geometry::Vec3;
 use std::collections::BTreeMap;
@@ -63,7 +63,13 @@ pub struct Formula {
     gradients: OnceLock<Tape>,
     gradient_intervals: OnceLock<Tape>,
     hessians: OnceLock<Tape>,
+    /// None for formulas with kinks and long ones.
+    hessian_intervals: OnceLock<Option<Tape>>,
 }
+
+/// Nodes of a formula up to which its second derivatives are enclosed: they have some ten times
+/// as many, and the boxes that they spare must pay for that.
+const MOST_BENT_NODES: usize = 1000;
 
 impl Formula {
     /// Reads a formula; `parameters` are the values of names that it may use.
@@ -79,6 +85,7 @@ impl Formula {
             gradients: OnceLock::new(),
             gradient_intervals: OnceLock::new(),
             hessians: OnceLock::new(),
+            hessian_intervals: OnceLock::new(),
             dag,
             root,
         })
@@ -116,12 +123,29 @@ impl Formula {
 
     fn hessian_tape(&self) -> &Tape {
         self.hessians.get_or_init(|| {
-            let mut dag = self.dag.clone();
-            let first = derivative::gradient(&mut dag, self.root);
-            let second = derivative::hessian(&mut dag, first);
+            let (dag, first, second) = self.second_derivatives();
             let roots: Vec<NodeId> = [self.root].into_iter().chain(first).chain(second).collect();
             compile(&dag, &roots, self.dag.n_nodes(), Target::Points)
         })
+    }
+
+    fn hessian_interval_tape(&self) -> Option<&Tape> {
+        let compiled = self.hessian_intervals.get_or_init(|| {
+            if self.dag.n_nodes() > MOST_BENT_NODES {
+                return None;
+            }
+            let (dag, _, second) = self.second_derivatives();
+            dag.has_continuous_slopes(&[self.root])
+                .then(|| compile(&dag, &second, self.dag.n_nodes(), Target::Intervals))
+        });
+        compiled.as_ref()
+    }
+
+    fn second_derivatives(&self) -> (Dag, [NodeId; 3], [NodeId; 6]) {
+        let mut dag = self.dag.clone();
+        let first = derivative::gradient(&mut dag, self.root);
+        let second = derivative::hessian(&mut dag, first);
+        (dag, first, second)
     }
 }
 
@@ -170,5 +194,24 @@ impl Field for Formula {
         enclose_all::<4, _>(tape, domains, out, |[value, x, y, z]| {
             Some(IntervalJet { value, gradient: [x, y, z] })
         });
+    }
+
+    fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {
+        let Some(tape) = self.hessian_interval_tape() else { return out.fill(None) };
+        let middles: Vec<_> =
+            domains.iter().map(|d| d.map(|side| Interval::point(side.midpoint()))).collect();
+        let zero = IntervalJet { value: Interval::ZERO, gradient: [Interval::ZERO; 3] };
+        let mut jets = vec![zero; domains.len()];
+        let slopes = self.gradient_interval_tape();
+        enclose_all::<4, _>(slopes, &middles, &mut jets, |[value, x, y, z]| IntervalJet {
+            value,
+            gradient: [x, y, z],
+        });
+        enclose_all::<6, _>(tape, domains, out, |hessian| {
+            Some(IntervalBend { middle: zero, hessian })
+        });
+        for (bend, middle) in out.iter_mut().flatten().zip(jets) {
+            bend.middle = middle;
+        }
     }
 }

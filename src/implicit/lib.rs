@@ -38,4 +38,4 @@ pub use functions::{CONSTANTS, FUNCTIONS, Function, VARIABLES};
 pub use inside::{Inside, InsideError, Side, resolve_inside};
 #[doc(hidden)]
 pub use instruction_set::{has_avx2, use_plain_code};
-pub use interval::{Interval, IntervalJet};
+pub use interval::{Interval, IntervalBend, IntervalJet};

@@ -4,15 +4,17 @@
 //! a part of T must satisfy one of
 //!
 //! 1. `f` and `L` have the same strict sign on the box, by enclosures, or
-//! 2. `grad L . grad f > 0` on the box, by the enclosure of `grad f`.
+//! 2. `grad L . grad f > 0` on the box, by the enclosure of `grad f` or, where f has one, by
+//!    `grad f(m) + H (x - m)` with the enclosure H of its second derivatives: the excess of that
+//!    form shrinks with the square of the box, so most cells pass whole.
 //!
 //! A box that fails both is halved along the axis that widens the enclosure most, within a budget;
 //! what still fails is refined. The crate's page proves what follows when all pass.
 
 use crate::complex::{Complex, Tetrahedron};
-use crate::interpolant::Interpolant;
+use crate::interpolant::{HESSIAN_ROWS, Interpolant};
 use isospline_geometry::Vec3;
-use isospline_implicit::{Field, Interval, IntervalJet, Jet1};
+use isospline_implicit::{Field, Interval, IntervalBend, IntervalJet, Jet1};
 
 /// Boxes that one cube may take. Expanded polynomials of high degree (the double torus) need a few
 /// hundred where their gradient is small; more only delays refinement where it is due.
@@ -121,10 +123,59 @@ fn look(field: &dyn Field, tests: &mut [Test<'_>], mut batch: Vec<Entry>) {
         }
     }
     look_closer(field, tests, &mut open);
-    measure_gains(field, tests, &open);
-    for ((i, part), _) in open.iter().rev() {
-        tests[*i].halve(part);
+    let Some(axes) = look_along_slopes(field, tests, &mut open) else {
+        measure_gains(field, tests, &open);
+        for ((i, part), _) in open.iter().rev() {
+            let axis = tests[*i].best_axis(part);
+            tests[*i].halve(part, axis);
+        }
+        return;
+    };
+    for (((i, part), _), axis) in open.iter().zip(axes).rev() {
+        tests[*i].halve(part, axis);
     }
+}
+
+/// Passes those that the forms of second order prove; for each that is left the axis along which
+/// they are least certain. `None` if the field has no enclosures of second derivatives.
+fn look_along_slopes(
+    field: &dyn Field,
+    tests: &[Test<'_>],
+    open: &mut Vec<(Entry, IntervalJet)>,
+) -> Option<Vec<usize>> {
+    let domains: Vec<_> = open.iter().map(|((_, part), _)| part.domain).collect();
+    let mut bends = vec![None; domains.len()];
+    field.bend_enclosures(&domains, &mut bends);
+    let bends = bends.into_iter().collect::<Option<Vec<IntervalBend>>>()?;
+    let mut axes = Vec::with_capacity(open.len());
+    let mut rows = bends.iter();
+    open.retain_mut(|((i, part), _)| {
+        let bend = rows.next().expect("invariant: a row each box");
+        let value = taylor_form(bend, part);
+        part.keep(&tests[*i], |l, part| {
+            !l.has_sign_of(value, part.middle, part.radius)
+                && !l.is_transversal_along(bend, &part.radius)
+        });
+        if part.open != 0 {
+            axes.push(tests[*i].loosest_axis(part, bend));
+        }
+        part.open != 0
+    });
+    Some(axes)
+}
+
+/// `f(m) + grad f(m) . d + d . H d / 2`, if bounded.
+fn taylor_form(bend: &IntervalBend, part: &Part) -> Interval {
+    let IntervalJet { value: at_middle, gradient } = bend.middle;
+    let size = |i: &Interval| i.lo.abs().max(i.hi.abs());
+    let r = part.radius;
+    let curved =
+        |k: usize| (0..3).map(|j| size(&bend.hessian[HESSIAN_ROWS[k][j]]) * r[j]).sum::<f64>();
+    let spread: f64 = (0..3).map(|k| r[k] * (size(&gradient[k]) + 0.5 * curved(k))).sum();
+    let spread = spread * (1.0 + 1e-12);
+    let form =
+        Interval::new((at_middle.lo - spread).next_down(), (at_middle.hi + spread).next_up());
+    if form.lo.is_finite() && form.hi.is_finite() { form } else { Interval::ENTIRE }
 }
 
 /// Passes those whose sign the mean value form tells.
@@ -210,15 +261,29 @@ impl<'a> Test<'a> {
         true
     }
 
+    /// The axis whose halving takes most from the width of the enclosure of the gradient.
+    fn best_axis(&self, part: &Part) -> usize {
+        let gain = |k: usize| self.gains[k] / (1_u64 << part.halvings[k]) as f64;
+        let axis = (0..3).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
+        axis.expect("invariant: three axes")
+    }
+
+    /// The axis along which the slopes of `grad L . grad f` spread most over the box. A hundredth
+    /// keeps long axes in play, since the sign of f needs them too.
+    fn loosest_axis(&self, part: &Part, bend: &IntervalBend) -> usize {
+        let spreads: Vec3 =
+            members(part.open).map(|l| self.interpolants[l].spreads(bend, &part.radius)).sum();
+        let share = 0.01 * (spreads.x + spreads.y + spreads.z) / part.radius.max();
+        let score = spreads + share * part.radius;
+        (0..3).max_by(|&a, &b| score[a].total_cmp(&score[b])).expect("invariant: three axes")
+    }
+
     /// Puts the halves of a box back, or takes it for failed.
-    fn halve(&mut self, part: &Part) {
+    fn halve(&mut self, part: &Part, axis: usize) {
         if part.halvings.iter().sum::<u32>() >= MOST_HALVINGS {
             self.failed |= part.open;
             return;
         }
-        let gain = |k: usize| self.gains[k] / (1_u64 << part.halvings[k]) as f64;
-        let axis = (0..3).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
-        let axis = axis.expect("invariant: three axes");
         let mut deeper = part.halvings;
         deeper[axis] += 1;
         let (mut lower, mut upper) = (part.domain, part.domain);

@@ -2,10 +2,13 @@
 
 use crate::complex::{Complex, EDGES, Tetrahedron};
 use isospline_geometry::Vec3;
-use isospline_implicit::Interval;
+use isospline_implicit::{Interval, IntervalBend};
 
 /// Margin for the rounding of the interpolant, relative to the terms that are summed.
 const ROUNDING: f64 = 1e-10;
+
+/// Places of the rows of a symmetric matrix in `[xx, xy, xz, yy, yz, zz]`.
+pub(crate) const HESSIAN_ROWS: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// The linear interpolant L of the node values on a tetrahedron T.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +56,40 @@ impl Interpolant {
         }
         // Unbounded or unknown slopes prove nothing.
         least > ROUNDING * size && enclosure.iter().all(|i| i.lo.is_finite() && i.hi.is_finite())
+    }
+
+    /// `grad L . grad f > 0` within `radius` of the middle of a box, by
+    /// `grad L . grad f(m) + (grad L . H) . (x - m)`.
+    pub(crate) fn is_transversal_along(&self, bend: &IntervalBend, radius: &Vec3) -> bool {
+        let (mut least, mut size) = (0.0, 0.0);
+        for (g, slope) in self.gradient.iter().zip(&bend.middle.gradient) {
+            least += (g * slope.lo).min(g * slope.hi);
+            size += g.abs() * slope.lo.abs().max(slope.hi.abs());
+        }
+        let spreads = self.spreads(bend, radius);
+        let spread = spreads.x + spreads.y + spreads.z;
+        // Unbounded slopes make the spread infinite or NaN; what cancels within it has the size
+        // of the terms, which the spread of the plain sizes bounds.
+        let sizes = HESSIAN_ROWS.map(|row| {
+            let size = |k: usize| bend.hessian[row[k]].lo.abs().max(bend.hessian[row[k]].hi.abs());
+            (0..3).map(|k| self.gradient[k].abs() * size(k)).sum::<f64>()
+        });
+        size += (0..3).map(|k| sizes[k] * radius[k]).sum::<f64>();
+        least - spread > ROUNDING * size && size.is_finite()
+    }
+
+    /// How far `(grad L . H) . d` reaches for `|d| <= radius`, by the components of d.
+    pub(crate) fn spreads(&self, bend: &IntervalBend, radius: &Vec3) -> Vec3 {
+        let of_axis = |k: usize| {
+            let (mut lo, mut hi) = (0.0, 0.0);
+            for (g, &at) in self.gradient.iter().zip(&HESSIAN_ROWS[k]) {
+                let (a, b) = (g * bend.hessian[at].lo, g * bend.hessian[at].hi);
+                lo += a.min(b);
+                hi += a.max(b);
+            }
+            hi.max(-lo) * radius[k]
+        };
+        Vec3::new(of_axis(0), of_axis(1), of_axis(2))
     }
 
     /// `f`, enclosed by `value`, and `L` are both positive or both negative on what the box

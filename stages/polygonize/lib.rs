@@ -88,7 +88,7 @@ pub struct Polygonize {
 
 impl Stage for Polygonize {
     const NAME: &'static str = "polygonize";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
     type Params = PolygonizeParams;
     type Whole<'a> = ();
     type Rows<'a> = ();
