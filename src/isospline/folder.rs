@@ -6,8 +6,8 @@ use isospline_artifact::kinds::{Mesh, Patches, Topology, TopologyProof};
 use isospline_artifact::{Artifact, Container, Durability, FolderStore, Store, StoreError};
 use isospline_check::{CheckReport, Expected, Job, Surface, SurfaceError};
 use isospline_pipeline::{
-    Event, Graph, ModelKey, NodeStatus, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
-    Threads, read_provenance,
+    Event, Graph, ModelKey, NodeStatus, Pipeline, Provenance, Registry, RunError, RunOptions,
+    RunReport, Scene, Threads, read_provenance,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -104,6 +104,14 @@ impl ModelFolder {
         self.pipeline().status()
     }
 
+    /// The record of an artifact; `None` if it is not there.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn record(&self, artifact: &str) -> Result<Option<Provenance>, StoreError> {
+        read_provenance(self.store(), artifact)
+    }
+
     /// The finished surface, all rows verified.
     ///
     /// # Errors
@@ -188,8 +196,6 @@ impl ModelFolder {
     ///
     /// The mesh stands beside the file, so that the folder can be moved.
     fn save_model(&self) -> Result<(), StoreError> {
-        // Taken and freed: a folder that another process works on keeps its model.
-        drop(self.store.lock()?);
         let mut file = self.model.file.clone();
         if let Some(text) = &self.model.base_mesh_text {
             file.model.base_mesh = Some(BASE_MESH_NOTE.into());
@@ -202,6 +208,8 @@ impl ModelFolder {
         if self.store.read_note(name)?.as_deref() == Some(text.as_bytes()) {
             return Ok(());
         }
+        // Taken and freed: a folder that another process works on keeps its model.
+        drop(self.store.lock()?);
         self.store.write_note(name, text.as_bytes())
     }
 

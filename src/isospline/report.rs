@@ -15,8 +15,12 @@ pub struct StageReport {
     pub stage: String,
     /// Whether it ran in this conversion.
     pub outcome: Outcome,
-    /// Wall time of its last run, seconds.
+    /// Wall time of its last run, seconds; stages at work at once share it.
     pub seconds: f64,
+    /// Time of its own work, seconds: its tasks spread evenly over all threads.
+    pub own_seconds: f64,
+    /// Tasks of its last run that were taken from an earlier one.
+    pub resumed_tasks: usize,
     /// Size of its artifact.
     pub bytes: u64,
     /// Figures and repairs.
@@ -118,6 +122,8 @@ fn stages(run: &RunReport) -> Vec<StageReport> {
             stage: node.stage.clone(),
             outcome: node.outcome,
             seconds: record.map_or(f64::NAN, |record| record.cost.seconds),
+            own_seconds: record.map_or(f64::NAN, |record| record.cost.own_seconds()),
+            resumed_tasks: node.resumed_tasks(),
             bytes: node.bytes,
             counters: record.map(|record| record.counters.clone()).unwrap_or_default(),
         }

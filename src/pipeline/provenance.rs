@@ -84,6 +84,15 @@ pub struct Cost {
     pub anonymous_bytes: u64,
 }
 
+impl Cost {
+    /// Time of the stage's own work, seconds: the tasks of a stage that has many spread evenly
+    /// over all threads. Added over all stages, it is about the time of a run without streaming.
+    pub fn own_seconds(&self) -> f64 {
+        let threads = if self.tasks > 1 { self.threads.max(1) } else { 1 };
+        self.prepare_seconds + self.task_seconds / threads as f64 + self.seal_seconds
+    }
+}
+
 /// Name of the record beside the artifact of this name.
 pub fn note_name(artifact: &str) -> String {
     let stem = artifact.strip_suffix(isospline_artifact::folder::SUFFIX).unwrap_or(artifact);

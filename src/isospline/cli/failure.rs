@@ -155,9 +155,11 @@ impl From<StoreError> for Failure {
                 (DAMAGED, "damaged", "remove the file and run the model again")
             }
             StoreError::Missing { .. } => (DAMAGED, "missing-artifact", "run the model first"),
-            StoreError::Locked { .. } => {
-                (LOCKED, "locked", "wait for the other run, or give another folder with --out")
-            }
+            StoreError::Locked { .. } => (
+                LOCKED,
+                "locked",
+                "wait for the other run to end, or give another folder with --out",
+            ),
             StoreError::Io { .. } => (IO, "input-output", "see whether the folder can be written"),
             _ => return Self::new(BUG, "bug", error.to_string()).helped(REPORT),
         };
@@ -184,7 +186,7 @@ impl From<RunError> for Failure {
         match error {
             RunError::Store(error) => error.into(),
             RunError::Stopped { .. } => {
-                Self::new(STOPPED, "stopped", message).helped("the same command goes on from there")
+                Self::new(STOPPED, "stopped", message).helped("run the same command to go on")
             }
             RunError::NotReady { .. } => Self::new(DAMAGED, "not-ready", message)
                 .helped("`isospline run` makes everything that is missing"),

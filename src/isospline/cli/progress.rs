@@ -1,23 +1,32 @@
-//! What a run tells while it goes on: a bar on a terminal, lines elsewhere, JSON if asked.
+//! What a run tells while it goes on: a bar a stage on a terminal, lines elsewhere, JSON if asked.
 
 use crate::cli::output::{duration, note, say};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isospline_pipeline::Event;
 use isospline_stage::Counters;
+use std::collections::BTreeMap;
 use std::io::IsTerminal;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Shows events.
 #[derive(Debug)]
 pub(crate) struct Progress {
     json: bool,
-    bar: Option<ProgressBar>,
+    bars: Option<Bars>,
+}
+
+/// A bar for every stage that is running, in the order of the graph.
+#[derive(Debug)]
+struct Bars {
+    all: MultiProgress,
+    running: Mutex<BTreeMap<usize, ProgressBar>>,
 }
 
 impl Progress {
     /// Shows events as JSON lines on standard output, or for people on standard error.
     pub(crate) fn new(json: bool) -> Self {
-        let bar = (!json && std::io::stderr().is_terminal()).then(new_bar);
-        Self { json, bar }
+        let bars = (!json && std::io::stderr().is_terminal()).then(Bars::new);
+        Self { json, bars }
     }
 
     /// Shows one event.
@@ -28,9 +37,10 @@ impl Progress {
             let _ = say(&line);
             return;
         }
+        if let Some(bars) = &self.bars {
+            bars.show(event);
+        }
         match event {
-            Event::StageStarted { stage, .. } => self.begin(stage),
-            Event::Progress { done, of, .. } => self.advance(*done, *of),
             Event::StageFinished { stage, seconds, counters, .. } => {
                 self.line(&format!("{stage:<15}{:>9}{}", duration(*seconds), remarks(counters)));
             }
@@ -43,45 +53,92 @@ impl Progress {
             Event::Discarded { stage, reason, .. } => {
                 self.line(&format!("{stage:<15}what was begun is not used: {reason}"));
             }
-            Event::Fresh { .. } | Event::Stored { .. } => {}
+            _ => {}
         }
     }
 
-    /// Takes the bar away.
+    /// Takes the bars away.
     pub(crate) fn end(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
-
-    fn begin(&self, stage: &str) {
-        if let Some(bar) = &self.bar {
-            bar.set_message(stage.to_owned());
-            bar.set_position(0);
-        }
-    }
-
-    fn advance(&self, done: u64, of: u64) {
-        if let Some(bar) = &self.bar {
-            bar.set_length(of);
-            bar.set_position(done);
+        if let Some(bars) = &self.bars {
+            for bar in std::mem::take(&mut *bars.running()).values() {
+                bar.finish_and_clear();
+            }
         }
     }
 
     fn line(&self, text: &str) {
-        match &self.bar {
-            Some(bar) => bar.suspend(|| note(text)),
+        match &self.bars {
+            Some(bars) => bars.all.suspend(|| note(text)),
             None => note(text),
         }
     }
 }
 
-fn new_bar() -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::stderr_with_hz(15));
-    let style = ProgressStyle::with_template("{msg:<15} {wide_bar} {percent:>3} %")
-        .expect("invariant: a fixed template");
-    bar.set_style(style);
-    bar
+impl Bars {
+    fn new() -> Self {
+        let target = ProgressDrawTarget::stderr_with_hz(15);
+        Self { all: MultiProgress::with_draw_target(target), running: Mutex::default() }
+    }
+
+    fn show(&self, event: &Event) {
+        match event {
+            Event::StageStarted { node, stage, .. } => self.begin(*node, stage),
+            Event::Resumed { node, done, of, .. } => {
+                self.advance(*node, *done, *of);
+                // What an earlier run did says nothing of how fast this one is.
+                self.with(*node, ProgressBar::reset_eta);
+            }
+            Event::Progress { node, done, of, .. } => self.advance(*node, *done, *of),
+            Event::StageFinished { node, .. } => {
+                let bar = self.running().remove(node);
+                if let Some(bar) = bar {
+                    bar.finish_and_clear();
+                    self.all.remove(&bar);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn begin(&self, node: usize, stage: &str) {
+        let bar = ProgressBar::new(1);
+        bar.set_style(style(false));
+        bar.set_message(stage.to_owned());
+        let mut running = self.running();
+        let place = running.range(..node).count();
+        running.insert(node, self.all.insert(place, bar));
+    }
+
+    fn advance(&self, node: usize, done: u64, of: u64) {
+        self.with(node, |bar| {
+            if bar.length() != Some(of) {
+                bar.set_length(of);
+                bar.set_style(style(of > 1));
+            }
+            bar.set_position(done);
+        });
+    }
+
+    fn with(&self, node: usize, change: impl FnOnce(&ProgressBar)) {
+        if let Some(bar) = self.running().get(&node) {
+            change(bar);
+        }
+    }
+
+    fn running(&self) -> MutexGuard<'_, BTreeMap<usize, ProgressBar>> {
+        // Every change is one insertion or removal.
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Rate and time left mean something where there are several steps.
+fn style(in_steps: bool) -> ProgressStyle {
+    let template = if in_steps {
+        "{msg:<15} {wide_bar} {percent:>3} % {per_sec:>12} {eta:>4} left"
+    } else {
+        "{msg:<15} {wide_bar} {percent:>3} %"
+    };
+    ProgressStyle::with_template(template).expect("invariant: a fixed template")
 }
 
 fn remarks(counters: &Counters) -> String {

@@ -9,30 +9,46 @@ use crate::cli::tables;
 use isospline::config::{ConfigError, ModelFile};
 use isospline::report::{ConversionReport, fingerprint};
 use isospline::{Model, ModelFolder, REPORT_NOTE};
-use isospline_artifact::{Durability, StoreError};
-use isospline_pipeline::{RunOptions, RunReport};
+use isospline_artifact::{Durability, StoreError, write_file_atomic};
+use isospline_pipeline::{RunOptions, RunReport, Trace};
 use std::path::PathBuf;
 
 /// Converts a model and checks the surface.
 pub(crate) fn run(args: &RunArgs, interrupt: &Interrupt) -> Result<u8, Failure> {
     let folder = folder(&args.model)?;
-    let options = RunOptions { from: args.from.as_deref(), ..options(&args.model) };
-    let mut report = execute(&folder, options, interrupt, args.model.json)?;
+    let trace = args.trace.as_ref().map(|_| Trace::new());
+    let (from, verify) = (args.from.as_deref(), args.verify);
+    let options = RunOptions { from, verify, trace: trace.as_ref(), ..options(&args.model) };
+    let outcome = convert(&folder, options, interrupt, args.model.json);
+    if let (Some(path), Some(trace)) = (&args.trace, &trace) {
+        // Of a run that failed too: then it is of most use.
+        write_file_atomic(path, Durability::Fast, |out| out.write_all(&trace.to_json()))?;
+    }
+    outcome
+}
+
+fn convert(
+    folder: &ModelFolder,
+    options: RunOptions<'_>,
+    interrupt: &Interrupt,
+    json: bool,
+) -> Result<u8, Failure> {
+    let mut report = execute(folder, options, interrupt, json)?;
     if matches!(folder.patches(), Err(StoreError::Damaged { .. })) {
         // Fresh by their headers, but not whole: what is damaged is found and made again.
         let options = RunOptions { verify: true, ..options };
-        report = execute(&folder, options, interrupt, args.model.json)?;
+        report = execute(folder, options, interrupt, json)?;
     }
     if report.all_fresh()
-        && let Some(code) = last_verdict(&folder, &report, args.model.json)?
+        && let Some(code) = last_verdict(folder, &report, json)?
     {
         return Ok(code);
     }
     let check = folder.check(options.threads)?;
-    let report = ConversionReport::new(&folder, &report, options.threads, check)?;
+    let report = ConversionReport::new(folder, &report, options.threads, check)?;
     let bytes = serde_json::to_vec_pretty(&report).expect("invariant: a report is plain data");
     folder.write_note(REPORT_NOTE, &bytes)?;
-    show(&folder, &report, args.model.json)?;
+    show(folder, &report, json)?;
     Ok(verdict(report.check.pass))
 }
 
@@ -73,7 +89,7 @@ fn model_file(args: &ModelArgs) -> Result<ModelFile, ConfigError> {
     }
 }
 
-fn options(args: &ModelArgs) -> RunOptions<'static> {
+fn options<'a>(args: &ModelArgs) -> RunOptions<'a> {
     let defaults = RunOptions::default();
     let threads = args.threads.map_or(defaults.threads, |n| n as usize);
     RunOptions { threads, ..defaults }

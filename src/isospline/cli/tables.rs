@@ -6,15 +6,15 @@ use isospline::report::ConversionReport;
 use isospline_check::{CheckParams, CheckReport, Expected};
 use std::fmt::Write as _;
 
-/// The stages of a conversion: time, share of the whole, size.
+/// The stages of a conversion: time of their own work, share of the whole, size.
 pub(crate) fn stages(report: &ConversionReport) -> String {
     // The time of a stage whose record is lost is not known.
-    let all: f64 = report.stages.iter().map(|s| s.seconds).filter(|s| s.is_finite()).sum();
-    let mut text = format!("{:<15}{:>10}{:>8}{:>10}\n", "stage", "time", "share", "size");
+    let all: f64 = report.stages.iter().map(|s| s.own_seconds).filter(|s| s.is_finite()).sum();
+    let mut text = format!("{:<15}{:>10}{:>8}{:>10}\n", "stage", "work", "share", "size");
     for stage in &report.stages {
-        let share = 100.0 * stage.seconds / all;
+        let share = 100.0 * stage.own_seconds / all;
         let share = if share.is_finite() { format!("{share:.1}%") } else { "-".to_owned() };
-        let (time, size) = (duration(stage.seconds), size(stage.bytes));
+        let (time, size) = (duration(stage.own_seconds), size(stage.bytes));
         writeln!(text, "{:<15}{time:>10}{share:>8}{size:>10}", stage.stage).expect(TEXT);
     }
     write!(text, "{:<15}{:>10}", "whole run", duration(report.seconds)).expect(TEXT);
