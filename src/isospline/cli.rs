@@ -5,6 +5,7 @@ mod check;
 mod excerpt;
 mod export;
 pub(crate) mod failure;
+mod inspect;
 pub(crate) mod interrupt;
 pub(crate) mod output;
 mod progress;
@@ -19,10 +20,16 @@ use interrupt::Interrupt;
 /// Carries out a command; failures are shown on standard error.
 pub(crate) fn dispatch(args: &Cli, interrupt: &Interrupt) -> u8 {
     let (outcome, json) = match &args.command {
-        Command::Run(args) => (run::run(args, interrupt), args.model.json),
-        Command::Stage(args) => (run::stage(args, interrupt), args.model.json),
-        Command::Status { dir } => (status::status(dir), false),
-        Command::Inspect { file, verify } => (status::inspect(file, *verify), false),
+        Command::Run(args) => {
+            interrupt.tells_json(args.model.json);
+            (run::run(args, interrupt), args.model.json)
+        }
+        Command::Stage(args) => {
+            interrupt.tells_json(args.model.json);
+            (run::stage(args, interrupt), args.model.json)
+        }
+        Command::Status { dir, json } => (status::status(dir, *json), *json),
+        Command::Inspect { file, verify } => (inspect::inspect(file, *verify), false),
         Command::Check(args) => (check::check(args), args.json),
         Command::Export(args) => (export::export(args), false),
     };
