@@ -1,0 +1,149 @@
+//! Stage relax: patches as near to the surface as exact G1 lets them be.
+//!
+//! Gauss-Newton on the normal distance inside the space of exact G1 surfaces over fixed curves,
+//! tile by tile with the rest fixed. Nothing is traded for the error: every surface on the way is
+//! G1 and watertight.
+
+mod element;
+mod envelope;
+mod error;
+mod face_moves;
+mod moves;
+mod numbering;
+mod params;
+mod restore;
+mod samples;
+mod tile_solve;
+mod tiling;
+
+pub use error::RelaxError;
+pub use params::RelaxParams;
+
+use isospline_artifact::kinds::{
+    BaseMeshView, CurvatureView, EdgeSystemsView, NetworkView, Patches, PatchesView,
+    VertexSystemsView,
+};
+use isospline_fitting::net::point;
+use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task, map};
+use moves::Moves;
+use restore::Conditions;
+use samples::{Interior, Samples};
+use tile_solve::{FIRST_DAMPING, Outcome, Problem};
+use tiling::{Tile, Tiling};
+
+/// Lowers the squared normal distance of all patches, tile by tile in colours that share no face.
+#[derive(Clone, Debug)]
+pub struct Relax {
+    params: RelaxParams,
+}
+
+impl Stage for Relax {
+    const NAME: &'static str = "relax";
+    const VERSION: u32 = 1;
+    type Params = RelaxParams;
+    type Whole<'a> = (
+        BaseMeshView<'a>,
+        CurvatureView<'a>,
+        NetworkView<'a>,
+        VertexSystemsView<'a>,
+        EdgeSystemsView<'a>,
+        PatchesView<'a>,
+    );
+    type Rows<'a> = ();
+    type Output = Patches;
+    type Error = RelaxError;
+
+    fn prepare(_: &Ctx<'_>, params: &RelaxParams, _: Self::Whole<'_>) -> Result<Self, RelaxError> {
+        Ok(Self { params: params.clone() })
+    }
+
+    fn plan(&self, _: Self::Whole<'_>, _: usize) -> Plan {
+        Plan::Whole
+    }
+
+    fn process(
+        &self,
+        ctx: &Ctx<'_>,
+        (mesh, curvature, network, vertices, edges, patches): Self::Whole<'_>,
+        (): (),
+        _: &Task,
+    ) -> Result<Piece<Patches>, RelaxError> {
+        let mut surface = Surface {
+            interior: patches.interior.iter().map(interior).collect(),
+            nu: edges.weights.iter().map(|w| w.nu).collect(),
+        };
+        let samples = Samples::new(self.params.grid);
+        let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
+        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
+        let mut counters = self.sweep(ctx, &problem, &mut surface)?;
+        let conditions = Conditions { mesh, curvature, network, vertices };
+        let restored = conditions.restore(ctx.host, &mut surface.interior, &surface.nu);
+        counters.merge(&restored);
+        let rows = Patches {
+            meta: patches.meta.to_vec(),
+            position: patches.position.to_vec(),
+            face: patches.face.to_vec(),
+            edge_of: patches.edge_of.to_vec(),
+            boundary: patches.boundary.to_vec(),
+            interior: surface.interior.iter().map(flat).collect(),
+        };
+        Ok(Piece { rows, counters })
+    }
+}
+
+/// What the moves change.
+struct Surface {
+    interior: Vec<Interior>,
+    /// The free scalar of each edge.
+    nu: Vec<f64>,
+}
+
+impl Surface {
+    fn take(&mut self, tile: &Tile, outcome: Outcome) {
+        for (&f, points) in tile.faces.iter().zip(outcome.interior.unwrap_or_default()) {
+            self.interior[f as usize] = points;
+        }
+        for (&e, change) in tile.edges.iter().zip(&outcome.nu) {
+            self.nu[e as usize] += change;
+        }
+    }
+}
+
+impl Relax {
+    /// All sweeps. Tiles of one colour share no face, so their order does not matter.
+    fn sweep(
+        &self,
+        ctx: &Ctx<'_>,
+        problem: &Problem<'_>,
+        surface: &mut Surface,
+    ) -> Result<Counters, RelaxError> {
+        let Tiling { tiles, colours } = Tiling::new(&problem.mesh, self.params.tile as usize);
+        let mut damping = vec![FIRST_DAMPING; tiles.len()];
+        let mut counters = Counters::default();
+        let n_visits = u64::from(self.params.sweeps) * tiles.len() as u64;
+        let mut visited = 0;
+        for colour in std::iter::repeat_n(&colours, self.params.sweeps as usize).flatten() {
+            ctx.host.progress(visited, n_visits)?;
+            let outcomes = map(ctx.host, colour.len(), |i| {
+                problem.visit(&tiles[colour[i]], &surface.interior, damping[colour[i]])
+            });
+            for (&t, outcome) in colour.iter().zip(outcomes) {
+                damping[t] = outcome.damping;
+                counters.count("visits_without_step", u64::from(outcome.interior.is_none()));
+                surface.take(&tiles[t], outcome);
+            }
+            visited += colour.len() as u64;
+        }
+        counters.count("visits", n_visits);
+        counters.count("tiles", tiles.len() as u64);
+        Ok(counters)
+    }
+}
+
+fn interior(row: &[f64; 45]) -> Interior {
+    std::array::from_fn(|i| point(row, i))
+}
+
+fn flat(points: &Interior) -> [f64; 45] {
+    std::array::from_fn(|i| points[i / 3][i % 3])
+}

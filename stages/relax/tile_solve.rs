@@ -1,0 +1,227 @@
+//! Gauss-Newton steps of one tile with the rest of the surface fixed.
+
+use crate::element::Element;
+use crate::envelope::Envelope;
+use crate::face_moves::FaceMoves;
+use crate::moves::Moves;
+use crate::numbering::Numbering;
+use crate::samples::{Interior, Samples};
+use crate::tiling::Tile;
+use isospline_artifact::kinds::{BaseMeshView, NetworkView};
+use isospline_fitting::net::boundary_net;
+use isospline_geometry::Vec3;
+use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index};
+use isospline_implicit::{Field, Jet1};
+
+/// Damping of a tile's first step, beside mean squared values of Bernstein polynomials; 1e-6
+/// needs three sweeps more, 1e-9 folds the first steps of coarse meshes.
+pub(crate) const FIRST_DAMPING: f64 = 1e-8;
+/// Least damping: below it steps drift in directions that the distance does not see.
+const LEAST_DAMPING: f64 = 1e-12;
+/// Factor on the damping after a step that helped. 8 and 4 need more sweeps, 32 more retries.
+const RELIEF: f64 = 1.0 / 16.0;
+/// Factor after one that did not.
+const TIGHTENING: f64 = 10.0;
+/// Steps tried a visit; more than three never paid.
+const ATTEMPTS: u32 = 3;
+/// Longest shift of a control point, times the mean side of its face.
+const SHIFT_CAP: f64 = 0.1;
+/// Damping of the amounts themselves, times that of control points, for moves that shift nothing.
+const AMOUNT_DAMPING: f64 = 1e-3;
+
+/// What all tiles share.
+#[derive(Clone, Copy)]
+pub(crate) struct Problem<'a> {
+    pub(crate) mesh: BaseMeshView<'a>,
+    pub(crate) network: NetworkView<'a>,
+    pub(crate) moves: &'a Moves,
+    pub(crate) samples: &'a Samples,
+    pub(crate) field: &'a dyn Field,
+}
+
+/// What a visit leaves behind.
+#[derive(Clone, Debug)]
+pub(crate) struct Outcome {
+    /// Interior points of the tile's faces; `None` if no step helped.
+    pub(crate) interior: Option<Vec<Interior>>,
+    /// Change of `nu` of the tile's edges.
+    pub(crate) nu: Vec<f64>,
+    /// Damping of the next visit.
+    pub(crate) damping: f64,
+}
+
+impl Problem<'_> {
+    /// One step that lowers the squared distance of the tile's samples, if one of a few does.
+    pub(crate) fn visit(&self, tile: &Tile, surface: &[Interior], damping: f64) -> Outcome {
+        let faces: Vec<Face> = tile.faces.iter().map(|&f| Face::new(self, f as usize)).collect();
+        let numbering = Numbering::new(&self.mesh, tile);
+        let interior: Vec<Interior> = tile.faces.iter().map(|&f| surface[f as usize]).collect();
+        let here = self.measure(&faces, &interior);
+        let mut outcome = Outcome { interior: None, nu: vec![0.0; tile.edges.len()], damping };
+        for _ in 0..ATTEMPTS {
+            if let Some(step) = self.step(tile, &faces, &numbering, &here, outcome.damping) {
+                let trial = step.applied(&interior);
+                if self.measure(&faces, &trial).is_better_than(&here) {
+                    outcome.interior = Some(trial);
+                    outcome.nu = step.nu;
+                    outcome.damping = (outcome.damping * RELIEF).max(LEAST_DAMPING);
+                    break;
+                }
+            }
+            outcome.damping *= TIGHTENING;
+        }
+        outcome
+    }
+
+    fn measure(&self, faces: &[Face], interior: &[Interior]) -> Measured {
+        let n = self.samples.len();
+        let mut points = vec![Vec3::zeros(); faces.len() * n];
+        for ((face, inner), points) in faces.iter().zip(interior).zip(points.chunks_exact_mut(n)) {
+            self.samples.points(&face.net, inner, points);
+        }
+        let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
+        self.field.gradients(&points, &mut jets);
+        let mut out = Measured::of(&jets);
+        for (i, (face, inner)) in faces.iter().zip(interior).enumerate() {
+            out.unsound += self.samples.folded(&face.net, inner, &out.normal[i * n..(i + 1) * n]);
+        }
+        out
+    }
+
+    /// The damped step; `None` where the equations have no finite solution.
+    fn step(
+        &self,
+        tile: &Tile,
+        faces: &[Face],
+        numbering: &Numbering,
+        here: &Measured,
+        damping: f64,
+    ) -> Option<Step> {
+        let n = self.samples.len();
+        let element = |i: usize| {
+            let rows = i * n..(i + 1) * n;
+            let (distance, normal) = (&here.distance[rows.clone()], &here.normal[rows]);
+            Element::new(self.samples, &faces[i].moves, distance, normal, damping)
+        };
+        let elements = (0..faces.len()).map(element).collect::<Option<Vec<Element>>>()?;
+        let amounts = solve(numbering, &elements, damping)?;
+        let shift = |i: usize| -> Interior {
+            let amounts = numbering.columns[i].map(|c| c.map_or(0.0, |c| amounts[c as usize]));
+            elements[i].shifts(&faces[i].moves.apply(&amounts))
+        };
+        let shifts: Vec<Interior> = (0..faces.len()).map(shift).collect();
+        let scale = shifts.iter().zip(faces).fold(1.0, |acc: f64, (s, f)| acc.min(f.cap(s)));
+        let nu =
+            tile.edges.iter().zip(&numbering.nu).map(|(&e, &unknown)| {
+                scale * amounts[unknown] * self.moves.edges[e as usize].nu_scale
+            });
+        let nu: Vec<f64> = nu.collect();
+        let is_finite = shifts.iter().flatten().flatten().all(|x| x.is_finite());
+        is_finite.then_some(Step { shifts, scale, nu })
+    }
+}
+
+/// A face of the tile.
+struct Face {
+    /// Boundary in place, zero inside.
+    net: [Vec3; N_CONTROL],
+    moves: FaceMoves,
+    /// Mean side.
+    size: f64,
+}
+
+impl Face {
+    fn new(problem: &Problem<'_>, face: usize) -> Self {
+        let net = boundary_net(&problem.mesh, &problem.network, face);
+        let corners = [0, 1, 2].map(|corner| net[boundary_index(DEGREE, corner, 0)]);
+        let side = |k: usize| (corners[k] - corners[(k + 1) % 3]).norm();
+        let size = (side(0) + side(1) + side(2)) / 3.0;
+        Self { net, moves: FaceMoves::new(&problem.mesh, problem.moves, face), size }
+    }
+
+    /// The part of these shifts that keeps within the cap.
+    fn cap(&self, shifts: &Interior) -> f64 {
+        let longest = shifts.iter().fold(0.0, |acc: f64, s| acc.max(s.norm()));
+        let limit = SHIFT_CAP * self.size;
+        if longest > limit { limit / longest } else { 1.0 }
+    }
+}
+
+/// A capped step.
+struct Step {
+    shifts: Vec<Interior>,
+    scale: f64,
+    nu: Vec<f64>,
+}
+
+impl Step {
+    fn applied(&self, interior: &[Interior]) -> Vec<Interior> {
+        let moved = |(points, shifts): (&Interior, &Interior)| {
+            std::array::from_fn(|i| points[i] + self.scale * shifts[i])
+        };
+        interior.iter().zip(&self.shifts).map(moved).collect()
+    }
+}
+
+/// Distances and unit normals at the samples of all faces.
+struct Measured {
+    distance: Vec<f64>,
+    normal: Vec<Vec3>,
+    /// Sum of squared distances.
+    sum_sq: f64,
+    /// Samples without a distance, and folds.
+    unsound: usize,
+}
+
+impl Measured {
+    /// Samples whose distance is not a number weigh nothing, but are counted.
+    fn of(jets: &[Jet1]) -> Self {
+        let n = jets.len();
+        let (distance, normal) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut out = Self { distance, normal, sum_sq: 0.0, unsound: 0 };
+        for jet in jets {
+            let slope = jet.gradient.norm();
+            let distance = jet.value / slope;
+            let is_sound = distance.is_finite() && slope.is_finite();
+            out.unsound += usize::from(!is_sound);
+            let (d, normal) =
+                if is_sound { (distance, jet.gradient / slope) } else { (0.0, Vec3::zeros()) };
+            out.distance.push(d);
+            out.normal.push(normal);
+            out.sum_sq += d * d;
+        }
+        out
+    }
+
+    fn is_better_than(&self, other: &Self) -> bool {
+        self.unsound <= other.unsound && self.sum_sq < other.sum_sq
+    }
+}
+
+/// Amounts of the tile's moves.
+fn solve(numbering: &Numbering, elements: &[Element], damping: f64) -> Option<Vec<f64>> {
+    let n = numbering.lowest.len();
+    let mut matrix = Envelope::default();
+    matrix.reset(&numbering.lowest);
+    let mut amounts = vec![0.0; n];
+    (0..n).for_each(|i| matrix.add(i, i, AMOUNT_DAMPING * damping));
+    for (element, columns) in elements.iter().zip(&numbering.columns) {
+        for (row, gradient, entries) in
+            columns.iter().zip(&element.gradient).zip(&element.matrix).filter_map(
+                |((row, gradient), entries)| Some(((*row)? as usize, gradient, entries)),
+            )
+        {
+            amounts[row] -= gradient;
+            for (column, x) in columns.iter().zip(entries) {
+                if let Some(column) = column.filter(|c| *c as usize <= row) {
+                    matrix.add(row, column as usize, *x);
+                }
+            }
+        }
+    }
+    if !matrix.factorise() {
+        return None;
+    }
+    matrix.solve(&mut amounts);
+    Some(amounts)
+}
