@@ -1,6 +1,9 @@
 //! How far the curve of an edge will be from the surface, before it is fitted.
 
 use crate::vertex::Vertex;
+use isospline_fitting::normal_curve::slant::Slant;
+use isospline_fitting::normal_curve::{NormalEdge, NormalFit, NormalOptions};
+use isospline_fitting::paper_curve::Ends;
 use isospline_fitting::shape::apply;
 use isospline_geometry::Vec3;
 use isospline_geometry::linear::solve;
@@ -22,21 +25,82 @@ const BATCH: usize = 64;
 /// Batches a task: fewer cost more to hand out than a second thread gains.
 const BATCHES_A_TASK: usize = 4;
 
-/// [`errors_of`] all edges, in their order, on the host's threads.
-pub(crate) fn curve_errors(field: &dyn Field, host: &dyn Host, edges: &[[&Vertex; 2]]) -> Vec<f64> {
-    let tasks: Vec<_> = edges.chunks(BATCH * BATCHES_A_TASK).collect();
-    let judge = |k: usize| -> Vec<f64> {
-        tasks[k].chunks(BATCH).flat_map(|batch| errors_of(field, batch)).collect()
+/// Eight iterations rank edges as thirty do.
+const NORMAL: NormalOptions = NormalOptions { samples: 10, iterations: 8 };
+
+/// An edge to be judged.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JudgedEdge<'a> {
+    /// Its two ends.
+    pub(crate) ends: [&'a Vertex; 2],
+    /// The vertices opposite to it in the face on its left and in that on its right; without them
+    /// tangents turn freely.
+    pub(crate) wings: Option<[&'a Vertex; 2]>,
+}
+
+/// How curves will be fitted.
+#[derive(Clone, Debug)]
+pub(crate) enum Measure {
+    /// By [TK, Eq. (9)].
+    Paper,
+    /// By normal distance.
+    Normal(NormalFit),
+}
+
+impl Measure {
+    pub(crate) fn normal() -> Self {
+        Self::Normal(NormalFit::new(NORMAL))
+    }
+
+    /// Distance from the surface of the curve between each pair of vertices, in model units; on
+    /// the host's threads. An edge without a sound curve, or near which the field is not finite,
+    /// has the error `0.1 * chord` at least.
+    pub(crate) fn errors(
+        &self,
+        field: &dyn Field,
+        host: &dyn Host,
+        edges: &[JudgedEdge<'_>],
+    ) -> Vec<f64> {
+        let of_batch = |batch: &[JudgedEdge<'_>]| match self {
+            Self::Paper => errors_of(field, &batch.iter().map(|e| e.ends).collect::<Vec<_>>()),
+            Self::Normal(fit) => normal_errors_of(fit, field, batch),
+        };
+        let tasks: Vec<_> = edges.chunks(BATCH * BATCHES_A_TASK).collect();
+        let judge = |k: usize| -> Vec<f64> { tasks[k].chunks(BATCH).flat_map(of_batch).collect() };
+        map(host, tasks.len(), judge).concat()
+    }
+}
+
+/// Largest normal distance of the curve of each edge, as the network stage will fit it.
+fn normal_errors_of(fit: &NormalFit, field: &dyn Field, edges: &[JudgedEdge<'_>]) -> Vec<f64> {
+    let edge = |JudgedEdge { ends, wings }: &JudgedEdge<'_>| NormalEdge {
+        ends: Ends {
+            points: ends.map(|v| v.position),
+            normals: ends.map(|v| v.normal),
+            shapes: ends.map(|v| v.shape),
+        },
+        slants: wings.map_or([Slant::free(); 2], |wings| slants(ends, &wings)),
     };
-    map(host, tasks.len(), judge).concat()
+    let given: Vec<NormalEdge> = edges.iter().map(edge).collect();
+    let curves = fit.fit(field, &given, &vec![None; given.len()]);
+    let chord = |[p, q]: &[&Vertex; 2]| (q.position - p.position).norm();
+    let pairs = edges.iter().zip(curves);
+    pairs.map(|(e, curve)| curve.map_or(UNSOUND * chord(&e.ends), |c| c.error)).collect()
+}
+
+fn slants([a, b]: &[&Vertex; 2], [left, right]: &[&Vertex; 2]) -> [Slant; 2] {
+    let at = |o: &Vertex, far: &Vertex, ccw: &Vertex, cw: &Vertex| {
+        let from = |v: &Vertex| v.position - o.position;
+        Slant::between(&from(far), &from(ccw), &from(cw), &o.normal)
+    };
+    [at(a, b, left, right), at(b, a, right, left)]
 }
 
 /// Largest distance from the surface of the quartic between each pair of vertices, in model units.
 ///
 /// The quartic has position, tangent plane and normal curvature of the surface at both ends and is
 /// the nearest such curve to the projected chord [TK, Eq. (9)]: what the network stage will fit,
-/// from fewer samples. Fifteen gradient evaluations an edge. An edge without a sound curve, or
-/// near which the field is not finite, has the error `0.1 * chord` at least.
+/// from fewer samples. Fifteen gradient evaluations an edge.
 fn errors_of(field: &dyn Field, edges: &[[&Vertex; 2]]) -> Vec<f64> {
     let samples = Samples::new();
     let chord_point = |[p, q]: &[&Vertex; 2], t: f64| p.position + t * (q.position - p.position);
@@ -226,6 +290,10 @@ mod tests {
     use isospline_implicit::ClosureField;
     use isospline_stage::Serial;
 
+    fn between(v: &[Vertex]) -> JudgedEdge<'_> {
+        JudgedEdge { ends: [&v[0], &v[1]], wings: None }
+    }
+
     #[test]
     fn on_a_sphere_the_error_falls_with_the_sixth_power_of_the_angle() {
         let field = ClosureField::new(2.0, |p: Vec3| p.norm_squared() - 1.0)
@@ -234,7 +302,7 @@ mod tests {
         let error = |angle: f64| {
             let ends = [Vec3::x(), Vec3::new(angle.cos(), angle.sin(), 0.0)];
             let v = vertices_at(&field, &Serial, &ends).unwrap();
-            curve_errors(&field, &Serial, &[[&v[0], &v[1]]])[0]
+            Measure::Paper.errors(&field, &Serial, &[between(&v)])[0]
         };
         let ratio = error(0.8) / error(0.4);
         assert!(error(0.4) < 1e-5 && error(0.4) > 1e-8, "{}", error(0.4));
@@ -242,10 +310,22 @@ mod tests {
     }
 
     #[test]
+    fn the_normal_distance_is_far_below_the_parametric_one() {
+        let field = ClosureField::new(2.0, |p: Vec3| p.norm_squared() - 1.0)
+            .with_gradient(|p| 2.0 * p)
+            .with_hessian(|_| [2.0, 0.0, 0.0, 2.0, 0.0, 2.0]);
+        let ends = [Vec3::x(), Vec3::new(0.8, 0.6, 0.0)];
+        let v = vertices_at(&field, &Serial, &ends).unwrap();
+        let error = |measure: Measure| measure.errors(&field, &Serial, &[between(&v)])[0];
+        let (normal, paper) = (error(Measure::normal()), error(Measure::Paper));
+        assert!(100.0 * normal < paper, "{normal:e} {paper:e}");
+    }
+
+    #[test]
     fn a_straight_edge_in_a_plane_has_no_error() {
         let field = ClosureField::new(1.0, |p: Vec3| p.z).with_gradient(|_| Vec3::z());
         let field = field.with_hessian(|_| [0.0; 6]);
         let v = vertices_at(&field, &Serial, &[Vec3::zeros(), Vec3::new(1.0, 2.0, 0.0)]).unwrap();
-        assert!(curve_errors(&field, &Serial, &[[&v[0], &v[1]]])[0] < 1e-16);
+        assert!(Measure::Paper.errors(&field, &Serial, &[between(&v)])[0] < 1e-16);
     }
 }

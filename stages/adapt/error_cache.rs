@@ -1,8 +1,7 @@
 //! Curve errors of all edges, computed anew only where the mesh has changed.
 
-use crate::curve_error::curve_errors;
+use crate::curve_error::{JudgedEdge, Measure};
 use crate::surface_mesh::SurfaceMesh;
-use crate::vertex::Vertex;
 use isospline_geometry::HalfEdge;
 
 /// An edge with the error of its curve, in model units.
@@ -21,7 +20,9 @@ pub(crate) struct ErrorCache {
 impl ErrorCache {
     /// Each edge with the error of its own curve.
     pub(crate) fn edges(&mut self, surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
-        self.own.update(surface, |h| [surface.mesh.origin(h), surface.mesh.target(h)])
+        self.own.update(surface, |h| {
+            ([surface.mesh.origin(h), surface.mesh.target(h)], surface.wings(h))
+        })
     }
 
     /// Each edge with the error of the curve between the vertices opposite to it, at a border its
@@ -29,16 +30,23 @@ impl ErrorCache {
     pub(crate) fn diagonals(&mut self, surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
         self.diagonal.update(surface, |h| {
             let own = [surface.mesh.origin(h), surface.mesh.target(h)];
-            surface.wings(h).unwrap_or(own)
+            match surface.wings(h) {
+                // Seen from the left wing, the target of h lies to the left.
+                Some(wings) => (wings, Some([own[1], own[0]])),
+                None => (own, None),
+            }
         })
     }
 }
 
+/// The ends of a curve and the vertices on its left and right.
+type Pair = ([u32; 2], Option<[u32; 2]>);
+
 /// Errors of the curves between pairs of vertices, one pair a half-edge row.
 #[derive(Debug, Default)]
 struct Rows {
-    /// The two vertices of the pair and how often both had moved.
-    keys: Vec<[u32; 3]>,
+    /// The vertices that the error depends on and how often they had moved.
+    keys: Vec<[u32; 5]>,
     errors: Vec<f64>,
 }
 
@@ -46,25 +54,32 @@ impl Rows {
     fn update(
         &mut self,
         surface: &SurfaceMesh<'_>,
-        pair: impl Fn(HalfEdge) -> [u32; 2],
+        pair: impl Fn(HalfEdge) -> Pair,
     ) -> Vec<EdgeError> {
         let rows = 3 * surface.mesh.face_rows();
-        self.keys.resize(rows, [u32::MAX; 3]);
+        self.keys.resize(rows, [u32::MAX; 5]);
         self.errors.resize(rows, 0.0);
         let mut edges = Vec::with_capacity(surface.mesh.face_count() * 3 / 2 + 1);
         let mut stale = Vec::new();
-        let mut ends: Vec<[&Vertex; 2]> = Vec::new();
+        let mut judged: Vec<JudgedEdge<'_>> = Vec::new();
+        let moves = |v: u32| surface.moves[v as usize];
         for h in surface.mesh.edge_list() {
-            let [a, b] = pair(h);
-            let key = [a, b, surface.moves[a as usize] + surface.moves[b as usize]];
+            let ([a, b], wings) = pair(h);
+            let mut key = [a, b, u32::MAX, u32::MAX, moves(a) + moves(b)];
+            // Curves of the paper leave along the chord whatever stands beside them.
+            let wings = wings.filter(|_| matches!(surface.measure, Measure::Normal(_)));
+            if let Some([c, d]) = wings {
+                key = [a, b, c, d, key[4] + moves(c) + moves(d)];
+            }
             if self.keys[h.row()] != key {
                 self.keys[h.row()] = key;
                 stale.push(edges.len());
-                ends.push([surface.at(a), surface.at(b)]);
+                let wings = wings.map(|wings| wings.map(|v| surface.at(v)));
+                judged.push(JudgedEdge { ends: [surface.at(a), surface.at(b)], wings });
             }
             edges.push((h, self.errors[h.row()]));
         }
-        let found = curve_errors(surface.field, surface.host, &ends);
+        let found = surface.measure.errors(surface.field, surface.host, &judged);
         for (at, error) in stale.into_iter().zip(found) {
             edges[at].1 = error;
             self.errors[edges[at].0.row()] = error;

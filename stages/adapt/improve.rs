@@ -1,7 +1,7 @@
 //! Rounds that move faces to where the edge curves are worst, at an equal number of faces.
 
 use crate::AdaptParams;
-use crate::curve_error::curve_errors;
+use crate::curve_error::{JudgedEdge, Measure};
 use crate::error_cache::{EdgeError, ErrorCache};
 use crate::gate::{Gate, quality};
 use crate::surface_mesh::SurfaceMesh;
@@ -39,8 +39,12 @@ pub(crate) fn improve(
     let mut best_score = Score::of(&errors);
     let mut failures = 0;
     let mut edits = Counters::default();
-    for round in 0..params.improve_rounds {
-        ctx.host.progress(u64::from(round), u64::from(params.improve_rounds))?;
+    let n_rounds = match surface.measure {
+        Measure::Paper => params.improve_rounds,
+        Measure::Normal(_) => params.normal_rounds,
+    };
+    for round in 0..n_rounds {
+        ctx.host.progress(u64::from(round), u64::from(n_rounds))?;
         let flipped = flip_round(surface, &gate, &errors, &cache.diagonals(surface));
         if flipped > 0 {
             errors = cache.edges(surface);
@@ -216,12 +220,13 @@ fn merged_errors(
     let tasks: Vec<_> = candidates.chunks(CANDIDATES_A_TASK).collect();
     let errors = map(surface.host, tasks.len(), |task| {
         let mut first = vec![0];
-        let mut spokes: Vec<[&Vertex; 2]> = Vec::new();
+        let mut spokes: Vec<JudgedEdge<'_>> = Vec::new();
         for (h, merged) in tasks[task] {
-            spokes.extend(ring(surface, *h).map(|v| [merged, surface.at(v)]));
+            let spoke = |v: u32| JudgedEdge { ends: [merged, surface.at(v)], wings: None };
+            spokes.extend(ring(surface, *h).map(spoke));
             first.push(spokes.len());
         }
-        let errors = curve_errors(surface.field, &Serial, &spokes);
+        let errors = surface.measure.errors(surface.field, &Serial, &spokes);
         let own = first.windows(2).map(|w| &errors[w[0]..w[1]]);
         own.map(|own| own.iter().copied().fold(0.0, f64::max)).collect::<Vec<f64>>()
     });

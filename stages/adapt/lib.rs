@@ -18,8 +18,9 @@ mod surface_mesh;
 mod vertex;
 
 pub use error::AdaptError;
-pub use params::{AdaptParams, Improve};
+pub use params::{AdaptParams, Curves, Improve};
 
+use curve_error::Measure;
 use error_cache::ErrorCache;
 use isospline_artifact::kinds::{BaseMesh, MeshView, TopologyProof};
 use isospline_geometry::TriangleMesh;
@@ -96,6 +97,28 @@ impl Adapt {
             improve::improve(ctx, &mut surface, goal, &mut cache, counters)?;
         }
         counters.max("curve_error_rel", improve::worst_curve_error_rel(&surface, &mut cache));
+        if improving && self.params.curves == Curves::Normal {
+            self.improve_normal(ctx, &mut surface, n_faces, counters)?;
+        }
+        counters.count("slivers_left", surface.slivers(self.params.min_quality));
         Ok(surface.mesh.compact())
+    }
+
+    /// Further rounds, judged by curves of normal distance.
+    fn improve_normal(
+        &self,
+        ctx: &Ctx<'_>,
+        surface: &mut SurfaceMesh<'_>,
+        n_faces: usize,
+        counters: &mut Counters,
+    ) -> Result<(), AdaptError> {
+        surface.measure = Measure::normal();
+        let mut cache = ErrorCache::default();
+        let error_in = improve::worst_curve_error_rel(surface, &mut cache);
+        counters.max("normal_curve_error_rel_in", error_in);
+        improve::improve(ctx, surface, (&self.params, n_faces), &mut cache, counters)?;
+        let error = improve::worst_curve_error_rel(surface, &mut cache);
+        counters.max("normal_curve_error_rel", error);
+        Ok(())
     }
 }

@@ -13,6 +13,17 @@ pub enum Improve {
     Never,
 }
 
+/// The method by which curves will be fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Curves {
+    /// `network.method = "normal"`: further rounds move faces to where such curves are worst.
+    Normal,
+    /// `network.method = "paper"`.
+    #[default]
+    Paper,
+}
+
 /// Parameters of the repair.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -30,6 +41,10 @@ pub struct AdaptParams {
     /// Rounds of improvement at most, 0 to 1000. On deccube the first four bring the error from
     /// 5e-4 to 7e-5; later ones help small meshes, until the interior of the patches decides.
     pub improve_rounds: u32,
+    /// By which curves edges are judged.
+    pub curves: Curves,
+    /// Rounds of improvement for curves of normal distance, after the others, 0 to 1000.
+    pub normal_rounds: u32,
 }
 
 impl Default for AdaptParams {
@@ -41,6 +56,8 @@ impl Default for AdaptParams {
             max_rounds: 40,
             improve: Improve::Auto,
             improve_rounds: 8,
+            curves: Curves::Paper,
+            normal_rounds: 12,
         }
     }
 }
@@ -53,6 +70,7 @@ impl isospline_stage::Params for AdaptParams {
             ("min_quality", self.min_quality, 0.0, 0.5),
             ("max_rounds", f64::from(self.max_rounds), 1.0, 1000.0),
             ("improve_rounds", f64::from(self.improve_rounds), 0.0, 1000.0),
+            ("normal_rounds", f64::from(self.normal_rounds), 0.0, 1000.0),
         ];
         for (key, value, low, high) in ranges {
             if !(low..=high).contains(&value) {

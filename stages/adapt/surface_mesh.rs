@@ -4,7 +4,8 @@
 //! [`Gate`]; the edit itself is a second call.
 
 use crate::AdaptError;
-use crate::gate::Gate;
+use crate::curve_error::Measure;
+use crate::gate::{Gate, quality};
 use crate::vertex::{Vertex, feet, vertices_at};
 use isospline_geometry::{EditMesh, HalfEdge, TriangleMesh, Vec3};
 use isospline_implicit::Field;
@@ -15,6 +16,8 @@ use isospline_stage::{Ctx, Host};
 pub(crate) struct SurfaceMesh<'a> {
     pub(crate) field: &'a dyn Field,
     pub(crate) host: &'a dyn Host,
+    /// How curves will be fitted: what edges are judged by.
+    pub(crate) measure: Measure,
     /// Diagonal of the bounding box of the input: the unit of relative lengths.
     pub(crate) diagonal: f64,
     pub(crate) mesh: EditMesh,
@@ -29,7 +32,8 @@ impl<'a> SurfaceMesh<'a> {
         let diagonal = mesh.bounds().diagonal();
         let vertices = vertices_at(field, host, &mesh.positions)?;
         let moves = vec![0; vertices.len()];
-        Ok(Self { field, host, diagonal, mesh: EditMesh::new(mesh)?, vertices, moves })
+        let (measure, mesh) = (Measure::Paper, EditMesh::new(mesh)?);
+        Ok(Self { field, host, measure, diagonal, mesh, vertices, moves })
     }
 
     pub(crate) fn at(&self, vertex: u32) -> &Vertex {
@@ -38,6 +42,12 @@ impl<'a> SurfaceMesh<'a> {
 
     pub(crate) fn corners(&self, face: u32) -> [&Vertex; 3] {
         self.mesh.face(face).map(|v| self.at(v))
+    }
+
+    /// Number of faces of less quality.
+    pub(crate) fn slivers(&self, min_quality: f64) -> u64 {
+        let is_sliver = |&f: &u32| quality(&self.corners(f)) < min_quality;
+        self.mesh.live_faces().filter(is_sliver).count() as u64
     }
 
     /// The two ends of `h`.
