@@ -19,6 +19,7 @@ use isospline_artifact::{Hashed, Key, SectionSource, StoreError};
 use stand::{Figures, Running, Stand, Trust};
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::{Builder, Scope};
 use std::time::Instant;
 
@@ -86,13 +87,14 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
 
     /// Whether nothing new is begun.
     fn halted(&self) -> bool {
-        self.failure.is_some() || self.frame.stopped() || self.finisher.has_failed()
+        self.frame.halted() || self.finisher.has_failed()
     }
 
     fn fail(&mut self, place: (usize, usize), error: RunError) {
         // Tasks fail in any order; of those that were under way the first is told.
         if self.failure.as_ref().is_none_or(|(first, _)| place < *first) {
             self.failure = Some((place, error));
+            self.frame.failed.store(true, Ordering::Relaxed);
         }
     }
 

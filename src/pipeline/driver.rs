@@ -12,7 +12,7 @@ use crate::{
 };
 use isospline_artifact::{Container, Store, StoreError};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is to be computed and where it is kept.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,8 @@ impl<'a> Pipeline<'a> {
         let nodes = resolve(self)?;
         let wanted = Wanted::of(self, options)?;
         let pool = Threads::new(options.threads.max(1));
-        let frame = Frame { pipeline: *self, nodes, scene, options: *options, events, pool };
+        let (pipeline, options, failed) = (*self, *options, AtomicBool::new(false));
+        let frame = Frame { pipeline, nodes, scene, options, events, pool, failed };
         let reports = if let Some(reports) = all_fresh(&frame, &wanted)? {
             reports
         } else {
@@ -167,11 +168,18 @@ pub(crate) struct Frame<'a> {
     pub(crate) options: RunOptions<'a>,
     pub(crate) events: Listener<'a>,
     pub(crate) pool: Threads,
+    /// Raised when something has failed: what is not begun is not to be.
+    pub(crate) failed: AtomicBool,
 }
 
 impl Frame<'_> {
     pub(crate) fn stopped(&self) -> bool {
         self.options.stop.load(Ordering::Relaxed)
+    }
+
+    /// Whether nothing new is to be begun.
+    pub(crate) fn halted(&self) -> bool {
+        self.stopped() || self.failed.load(Ordering::Relaxed)
     }
 
     pub(crate) fn threads(&self) -> usize {

@@ -42,6 +42,16 @@ pub(crate) enum Job<'f> {
     Task { stage: Arc<Active<'f>>, task: usize },
 }
 
+impl Job<'_> {
+    fn node(&self) -> usize {
+        match self {
+            Self::Verify { node, .. } => *node,
+            Self::Prepare(assignment) => assignment.node,
+            Self::Task { stage, .. } => stage.node,
+        }
+    }
+}
+
 /// What came of a job.
 pub(crate) enum Notice<'f> {
     /// Rows were compared with their checksums.
@@ -114,6 +124,10 @@ fn work<'f>(
         let start = clock::now();
         // A failed send means that the run is over.
         match job {
+            job if frame.halted() => {
+                let node = job.node();
+                drop(notices.send(Notice::Failed { node, task: 0, error: None }));
+            }
             Job::Verify { node, container } => {
                 let result = container.verify();
                 lane.note(&frame.nodes[node].label, "verify", start, None);

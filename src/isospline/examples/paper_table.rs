@@ -45,7 +45,7 @@ fn row(report: &Value) {
     let check = &report["check"];
     print!("{:<14}{:>6}", report["model"].as_str().unwrap_or("?"), check["faces"].to_string());
     let times: Vec<Option<f64>> =
-        STAGES.iter().map(|name| stage(report, name)?["seconds"].as_f64()).collect();
+        STAGES.iter().map(|name| stage(report, name)?["own_seconds"].as_f64()).collect();
     for time in &times {
         print!("{:>8}", time.map_or_else(|| "-".to_owned(), |s| format!("{:.1}", 1e3 * s)));
     }

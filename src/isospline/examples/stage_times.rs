@@ -4,6 +4,7 @@
 
 use isospline::config::ModelFile;
 use isospline::{Model, Options, convert};
+use isospline_pipeline::RunOptions;
 use std::path::Path;
 
 /// Faces, and runs of which the fastest counts.
@@ -43,8 +44,10 @@ fn least_times(
 ) -> Result<Vec<(String, f64)>, Box<dyn std::error::Error>> {
     let mut least: Vec<(String, f64)> = Vec::new();
     for _ in 0..n_runs {
-        let options =
-            Options { faces, stages: model.file.stages.clone(), ..Options::new(model.domain) };
+        // One stage after another: a stage's wall time is its own then.
+        let run = RunOptions { streaming: false, ..RunOptions::default() };
+        let stages = model.file.stages.clone();
+        let options = Options { faces, stages, run, ..Options::new(model.domain) };
         let surface = convert(&model.field, &options)?;
         for (k, node) in surface.report.nodes.iter().enumerate() {
             let seconds = node.provenance.as_ref().map_or(f64::NAN, |p| p.cost.seconds);

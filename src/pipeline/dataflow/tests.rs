@@ -1,5 +1,6 @@
 //! Stages at work behind each other, and runs that go on where an earlier one ended.
 
+use crate::faulty::FaultyStore;
 use crate::toys::{Bench, FILES, NoField, all_bytes};
 use crate::{Event, Outcome, RunError, RunOptions, Scene, Trace};
 use isospline_artifact::journal::HEAD;
@@ -121,6 +122,28 @@ fn a_run_stopped_after_any_task_goes_on_there() {
             }
         }
     }
+}
+
+#[test]
+fn a_fault_at_any_operation_of_a_resumed_run_is_reported_and_repaired_by_the_next_one() {
+    let bench = Bench::long();
+    let expected = all_bytes(&bench.stored());
+    let mut faults = 0;
+    for k in 1.. {
+        let kept = MemoryStore::new();
+        stopped_after(12, &bench, &kept, options(1, 10));
+        let (result, _) = bench.run(&FaultyStore::new(kept.clone(), k), &options(2, 10));
+        let Err(error) = result else { break };
+        faults += 1;
+        assert!(error.to_string().ends_with("injected"), "{k}: {error}");
+        for file in all_bytes(&kept) {
+            assert!(expected.contains(&file), "{k}: {} is not what it should be", file.0);
+        }
+        bench.run(&kept, &options(2, 10)).0.unwrap();
+        assert!(all_bytes(&kept) == expected, "{k}");
+    }
+    // Three stages: journal read, opened and written a task, file opened, mapped, written.
+    assert!(faults > 60, "{faults} faults");
 }
 
 #[test]
