@@ -1,6 +1,6 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench golden pictures docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench reliability golden pictures docs clean
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
@@ -42,6 +42,9 @@ readers: build ## read the exports with vtk, trimesh and numpy
 bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50k faces
 	$(CARGO) bench --workspace
 	$(CARGO) run --release -q -p isospline --example stage_times
+
+reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
+	$(CARGO) run --release -q -p isospline-tests --bin scoreboard
 
 golden: ## rewrite tests/golden; read the diff
 	ISOSPLINE_GOLDEN=rewrite $(CARGO) test -p isospline-tests --test golden

@@ -1,5 +1,7 @@
 //! What the tests share: the built program, a folder of its own, model files.
 
+pub mod reliability;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -142,12 +144,17 @@ pub fn number(report: &serde_json::Value, name: &str) -> f64 {
 
 /// The built program, brought up to date first: a stale one would make tests pass or fail for
 /// code that is not there.
-fn program() -> &'static Path {
+///
+/// # Panics
+/// If it does not build.
+pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        // .../target/<profile>/deps/<test>
+        // .../target/<profile>/deps/<test>, or .../target/<profile>/<binary>
         let test = std::env::current_exe().expect("a test has a path");
-        let profile = test.parent().and_then(Path::parent).expect("a profile's folder");
+        let folder = test.parent().expect("a program lies in a folder");
+        let above = folder.parent().filter(|_| folder.ends_with("deps"));
+        let profile = above.unwrap_or(folder);
         let target = profile.parent().expect("a target folder");
         let release = profile.ends_with("release");
         let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
