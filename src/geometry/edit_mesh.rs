@@ -36,6 +36,21 @@ impl EditMesh {
     pub fn new(mesh: TriangleMesh) -> Result<Self, Defect> {
         let opposite = mesh.opposites()?;
         mesh.check_fans(&opposite)?;
+        Ok(Self::with_opposites(mesh, opposite))
+    }
+
+    /// Takes over some faces of a manifold mesh. A vertex on their border may have several fans
+    /// of them, of which walks about it meet one: leave such vertices and their neighbours alone,
+    /// and all edits keep the whole mesh a manifold of the same topology.
+    ///
+    /// # Errors
+    /// The [`Defect`] of an edge.
+    pub fn part(mesh: TriangleMesh) -> Result<Self, Defect> {
+        let opposite = mesh.opposites()?;
+        Ok(Self::with_opposites(mesh, opposite))
+    }
+
+    fn with_opposites(mesh: TriangleMesh, opposite: Vec<u32>) -> Self {
         let TriangleMesh { positions, faces } = mesh;
         let mut outgoing = vec![GONE; positions.len()];
         for h in (0..3 * faces.len() as u32).map(HalfEdge) {
@@ -46,7 +61,7 @@ impl EditMesh {
         }
         let (n_faces, n_vertices) = (faces.len(), positions.len());
         let mark = vec![0; n_vertices];
-        Ok(Self { positions, faces, opposite, outgoing, n_faces, n_vertices, mark, stamp: 0 })
+        Self { positions, faces, opposite, outgoing, n_faces, n_vertices, mark, stamp: 0 }
     }
 
     /// The mesh without holes; vertices and faces keep their order.

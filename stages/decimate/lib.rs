@@ -28,7 +28,7 @@ pub struct Decimate {
 
 impl Stage for Decimate {
     const NAME: &'static str = "decimate";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
     type Params = DecimateParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();

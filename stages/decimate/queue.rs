@@ -3,11 +3,15 @@
 use crate::heap::WordHeap;
 use isospline_geometry::{EditMesh, HalfEdge};
 
+/// Bits of the high word of a cost that count: sign, exponent and 5 of the mantissa, steps of 3 %.
+const COST_BITS: u32 = !0x7fff;
+
 /// Edges by ascending cost, ties by half-edge.
 ///
-/// Costs are kept to 20 bits of mantissa so that an entry is one word: finer differences do not
-/// matter for the order, and the heap is what the loop waits for. An entry is current if its cost
-/// is the one last set for its half-edge; others are skipped when met.
+/// Costs are kept to 5 bits of mantissa. Finer differences do not matter for the order, and edges
+/// of equal cost come in the order of the mesh: large meshes would otherwise miss the cache at
+/// every step. An entry is one word, for the heap is what the loop waits for; it is current if its
+/// cost is the one last set for its half-edge, and others are skipped when met.
 #[derive(Debug)]
 pub(crate) struct EdgeQueue {
     heap: WordHeap,
@@ -23,7 +27,7 @@ impl EdgeQueue {
 
     /// Sets the non-negative cost of the edge `h`, `opposite` without queueing it.
     pub(crate) fn set(&mut self, h: HalfEdge, opposite: HalfEdge, cost: f64) {
-        let high = (cost.to_bits() >> 32) as u32;
+        let high = (cost.to_bits() >> 32) as u32 & COST_BITS;
         self.cost[h.row()] = high;
         self.cost[opposite.row()] = high;
     }

@@ -25,9 +25,12 @@ const KUHN: [Tetrahedron; 6] =
 #[derive(Clone, Debug)]
 struct Cell {
     corners: [u32; 8],
-    /// Its tetrahedra once it is refined; none while Kuhn's six stand.
-    refined: Vec<Leaf>,
+    /// Row of its tetrahedra once it is refined; [`WHOLE`] while Kuhn's six stand.
+    refined: u32,
 }
+
+/// Marks a cell that is not refined.
+const WHOLE: u32 = u32::MAX;
 
 /// A tetrahedron of a refined cell.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +46,8 @@ pub(crate) struct Complex {
     /// The grid of the cells.
     pub(crate) grid: Grid,
     cells: Vec<Cell>,
+    /// Tetrahedra of the refined cells, which are few.
+    refined: Vec<Vec<Leaf>>,
     cell_at: KeyMap,
     sites: Vec<u64>,
     values: Vec<f64>,
@@ -62,6 +67,7 @@ impl Complex {
         let mut complex = Self {
             grid,
             cells: Vec::with_capacity(cells.len()),
+            refined: Vec::new(),
             cell_at: KeyMap::with_room_for(cells.len()),
             sites: Vec::new(),
             values: Vec::new(),
@@ -75,10 +81,18 @@ impl Complex {
             let corner = |i: u32| [cell[0] + (i & 1), cell[1] + (i >> 1 & 1), cell[2] + (i >> 2)];
             let corners = std::array::from_fn(|i| complex.node(corner(i as u32)));
             complex.cell_at.get_or_insert(pack(cell), row);
-            complex.cells.push(Cell { corners, refined: Vec::new() });
+            complex.cells.push(Cell { corners, refined: WHOLE });
         }
         complex.evaluate(ctx)?;
         Ok(complex)
+    }
+
+    /// Gives up what only refining needs: a third of the memory.
+    pub(crate) fn keep_as_it_is(&mut self) {
+        for map in [&mut self.cell_at, &mut self.node_at, &mut self.halved] {
+            *map = KeyMap::with_room_for(0);
+        }
+        self.queued = Vec::new();
     }
 
     /// Cells that the surface may touch.
@@ -89,6 +103,7 @@ impl Complex {
     /// All tetrahedra of a cell.
     pub(crate) fn tetrahedra(&self, cell: usize) -> impl Iterator<Item = Tetrahedron> + '_ {
         let Cell { corners, refined } = &self.cells[cell];
+        let refined = self.refined.get(*refined as usize).map_or(&[][..], Vec::as_slice);
         let kuhn = if refined.is_empty() { &KUHN[..] } else { &[] };
         kuhn.iter().map(|t| t.map(|i| corners[i as usize])).chain(refined.iter().map(|t| t.nodes))
     }
@@ -102,7 +117,7 @@ impl Complex {
     /// Whether all corners of an unrefined cell lie on one side: it has no piece of the mesh.
     pub(crate) fn is_one_sided(&self, cell: usize) -> bool {
         let Cell { corners, refined } = &self.cells[cell];
-        refined.is_empty() && corners.iter().all(|&n| self.inside(n) == self.inside(corners[0]))
+        *refined == WHOLE && corners.iter().all(|&n| self.inside(n) == self.inside(corners[0]))
     }
 
     /// Lattice point of a node.
@@ -176,7 +191,8 @@ impl Complex {
         touched.dedup();
         let mut new = Vec::new();
         for cell in touched {
-            for leaf in &mut self.cells[cell as usize].refined {
+            let row = self.cells[cell as usize].refined;
+            for leaf in &mut self.refined[row as usize] {
                 if std::mem::take(&mut leaf.is_new) {
                     new.push(leaf.nodes);
                 }
@@ -187,7 +203,8 @@ impl Complex {
 
     /// Bisects the tetrahedra of a cell until none of them has an edge that is halved now.
     fn bisect_cell(&mut self, cell: usize) {
-        let mut stack = std::mem::take(&mut self.cells[cell].refined);
+        let row = self.cells[cell].refined;
+        let mut stack = self.refined.get_mut(row as usize).map(std::mem::take).unwrap_or_default();
         if stack.is_empty() {
             stack.extend(self.tetrahedra(cell).map(|nodes| Leaf { nodes, is_new: false }));
         }
@@ -208,7 +225,12 @@ impl Complex {
         }
         // A cell that was only looked at keeps Kuhn's six unstored.
         if done.len() > 6 || done.iter().any(|leaf| leaf.is_new) {
-            self.cells[cell].refined = done;
+            if row == WHOLE {
+                self.cells[cell].refined = self.refined.len() as u32;
+                self.refined.push(done);
+            } else {
+                self.refined[row as usize] = done;
+            }
             self.touched.push(cell as u32);
         }
     }

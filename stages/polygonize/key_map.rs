@@ -6,55 +6,59 @@
 /// Marks a free slot; no packed key has all bits set.
 const FREE: u64 = u64::MAX;
 
-/// Open addressing with linear probing; at most half of the slots are taken.
+/// Open addressing with linear probing; at most three quarters of the slots are taken.
 #[derive(Clone, Debug)]
 pub(crate) struct KeyMap {
-    slots: Vec<(u64, u32)>,
+    keys: Vec<u64>,
+    /// Beside the keys, not among them: a pair would be padded by a quarter.
+    rows: Vec<u32>,
     len: usize,
 }
 
 impl KeyMap {
     /// A map with room for `n` keys before it grows.
     pub(crate) fn with_room_for(n: usize) -> Self {
-        Self { slots: vec![(FREE, 0); (2 * n).next_power_of_two().max(16)], len: 0 }
+        let slots = (n + n / 3 + 1).next_power_of_two().max(16);
+        Self { keys: vec![FREE; slots], rows: vec![0; slots], len: 0 }
     }
 
     /// The row of `key`.
     pub(crate) fn get(&self, key: u64) -> Option<u32> {
-        let (found, row) = self.slots[self.slot(key)];
-        (found == key).then_some(row)
+        let slot = self.slot(key);
+        (self.keys[slot] == key).then(|| self.rows[slot])
     }
 
     /// The row of `key`, and whether it is new: then it is `row`.
     pub(crate) fn get_or_insert(&mut self, key: u64, row: u32) -> (u32, bool) {
         let slot = self.slot(key);
-        if self.slots[slot].0 == key {
-            return (self.slots[slot].1, false);
+        if self.keys[slot] == key {
+            return (self.rows[slot], false);
         }
-        self.slots[slot] = (key, row);
+        (self.keys[slot], self.rows[slot]) = (key, row);
         self.len += 1;
-        if 2 * self.len > self.slots.len() {
+        if 4 * self.len > 3 * self.keys.len() {
             self.grow();
         }
         (row, true)
     }
 
     fn slot(&self, key: u64) -> usize {
-        let mask = self.slots.len() - 1;
+        let mask = self.keys.len() - 1;
         // Fibonacci hashing: the high bits of the product mix all bits of the key.
         let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
-        while self.slots[slot].0 != FREE && self.slots[slot].0 != key {
+        while self.keys[slot] != FREE && self.keys[slot] != key {
             slot = (slot + 1) & mask;
         }
         slot
     }
 
     fn grow(&mut self) {
-        let old = std::mem::take(&mut self.slots);
-        self.slots = vec![(FREE, 0); 2 * old.len()];
-        for (key, row) in old.into_iter().filter(|&(key, _)| key != FREE) {
+        let slots = 2 * self.keys.len();
+        let keys = std::mem::replace(&mut self.keys, vec![FREE; slots]);
+        let rows = std::mem::replace(&mut self.rows, vec![0; slots]);
+        for (key, row) in keys.into_iter().zip(rows).filter(|&(key, _)| key != FREE) {
             let slot = self.slot(key);
-            self.slots[slot] = (key, row);
+            (self.keys[slot], self.rows[slot]) = (key, row);
         }
     }
 }

@@ -88,7 +88,7 @@ pub struct Polygonize {
 
 impl Stage for Polygonize {
     const NAME: &'static str = "polygonize";
-    const VERSION: u32 = 4;
+    const VERSION: u32 = 5;
     type Params = PolygonizeParams;
     type Whole<'a> = ();
     type Rows<'a> = ();
@@ -136,15 +136,16 @@ fn polygonize(
     let least = LEAST_OF_FACES * f64::from(params.faces);
     let mut tries = 1;
     loop {
-        let cells = f64::from(survey.complex.grid.longest());
+        let grid = survey.complex.grid.clone();
+        let cells = f64::from(grid.longest());
         let mut found = Counters::default();
-        let (mesh, proof) = triangulate(ctx, params, &survey, &mut found)?;
+        let (mesh, proof) = triangulate(ctx, params, survey, &mut found)?;
         let share = mesh.faces.len() as f64 / least;
         let finer = if params.cells > 0 || share >= 1.0 || tries == MOST_TRIES {
             None
         } else {
             // A little more than the count asks for, so that one try is enough.
-            resolution::finer(ctx, params, &survey, (1.1 * cells / share.sqrt()).ceil())?
+            resolution::finer(ctx, params, &grid, (1.1 * cells / share.sqrt()).ceil())?
         };
         let Some(finer) = finer else {
             *counters = found;
@@ -159,22 +160,22 @@ fn polygonize(
 fn triangulate(
     ctx: &Ctx<'_>,
     params: &PolygonizeParams,
-    survey: &Survey,
+    survey: Survey,
     counters: &mut Counters,
 ) -> Result<(TriangleMesh, TopologyProof), PolygonizeError> {
-    let mut complex = survey.complex.clone();
+    let Survey { mut complex, cells, .. } = survey;
     let grid = complex.grid.clone();
     ctx.host.progress(0, 1)?;
-    let sides_are_clear =
-        box_sides::are_clear(ctx, &grid, &survey.cells).or_else(|leaves_box| {
-            // A larger box would not mend a singular surface: that is the better message.
-            proof::no_singular_point(ctx, &complex).and(Err(leaves_box))
-        })?;
+    let sides_are_clear = box_sides::are_clear(ctx, &grid, &cells).or_else(|leaves_box| {
+        // A larger box would not mend a singular surface: that is the better message.
+        proof::no_singular_point(ctx, &complex).and(Err(leaves_box))
+    })?;
+    drop(cells);
     counters.count("cells", complex.n_cells() as u64);
     counters.max("cells_a_side", f64::from(grid.longest()));
     let failed = proof::prove(ctx, &mut complex, params, counters)?;
     if sides_are_clear && failed.is_empty() {
-        return Ok((extract(ctx, &complex)?, TopologyProof::Certified));
+        return Ok((extract(ctx, complex)?, TopologyProof::Certified));
     }
     // Without interval arithmetic every box fails: there the samples alone decide.
     let doubtful = if surface_cells::has_intervals(ctx, &grid) {
@@ -184,18 +185,20 @@ fn triangulate(
     };
     let observed = observation::observe(ctx, &grid, params, &doubtful)?;
     lost_parts::none_is_lost(ctx, &observed, &doubtful)?;
-    Ok((extract(ctx, &observed)?, TopologyProof::Observed))
+    Ok((extract(ctx, observed)?, TopologyProof::Observed))
 }
 
-fn extract(ctx: &Ctx<'_>, complex: &Complex) -> Result<TriangleMesh, PolygonizeError> {
-    let pieces = Pieces::of(complex);
+fn extract(ctx: &Ctx<'_>, mut complex: Complex) -> Result<TriangleMesh, PolygonizeError> {
+    complex.keep_as_it_is();
+    let pieces = Pieces::of(&complex);
     if pieces.crossings.is_empty() {
         return Err(resolution::empty_level_set(ctx));
     }
-    box_sides::no_crossing_on_sides(ctx, complex, &pieces.crossings)?;
+    box_sides::no_crossing_on_sides(ctx, &complex, &pieces.crossings)?;
     let step = complex.grid.lattice_step();
     let side = |&[a, b]: &[u32; 2]| step * f64::from(complex.extent(a, b));
     let sides: Vec<_> = pieces.crossings.iter().map(side).collect();
-    let mesh = pieces.triangulate(crossing::positions(ctx, complex, &pieces.crossings));
-    Ok(short_edges::merge(mesh, &sides, ctx.field))
+    let positions = crossing::positions(ctx, &complex, &pieces.crossings);
+    drop(complex);
+    Ok(short_edges::merge(ctx, pieces.triangulate(positions), sides))
 }

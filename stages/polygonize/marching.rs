@@ -33,14 +33,21 @@ impl Pieces {
         pieces
     }
 
-    /// Triangles that [`Self::triangulate`] makes.
-    pub(crate) fn n_triangles(&self) -> usize {
-        self.polygons.len() + self.polygons.iter().filter(|p| p[3] != NONE).count()
+    /// Triangles that the pieces of a complex are cut into.
+    pub(crate) fn count(complex: &Complex) -> usize {
+        let triangles = |t: Tetrahedron| match t.iter().filter(|&&n| complex.inside(n)).count() {
+            0 | 4 => 0,
+            2 => 2,
+            _ => 1,
+        };
+        let cells = (0..complex.n_cells()).filter(|&c| !complex.is_one_sided(c));
+        cells.map(|c| complex.tetrahedra(c).map(triangles).sum::<usize>()).sum()
     }
 
     /// Cuts quadrilaterals along their shorter diagonal.
-    pub(crate) fn triangulate(&self, positions: Vec<Vec3>) -> TriangleMesh {
-        let mut faces = Vec::with_capacity(self.n_triangles());
+    pub(crate) fn triangulate(self, positions: Vec<Vec3>) -> TriangleMesh {
+        let n_quads = self.polygons.iter().filter(|p| p[3] != NONE).count();
+        let mut faces = Vec::with_capacity(self.polygons.len() + n_quads);
         for &[a, b, c, d] in &self.polygons {
             let length_sq =
                 |i: u32, j: u32| (positions[i as usize] - positions[j as usize]).norm_squared();

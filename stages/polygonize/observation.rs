@@ -88,7 +88,8 @@ fn components(
         });
     }
     box_sides::no_crossing_on_sides(ctx, complex, &pieces.crossings)?;
-    let mesh = pieces.triangulate(crossing::linear_positions(complex, &pieces.crossings));
+    let positions = crossing::linear_positions(complex, &pieces.crossings);
+    let mesh = pieces.triangulate(positions);
     let opposite = mesh.opposites().expect("invariant: marching tetrahedra make a manifold");
     let of_face = mesh.face_components(&opposite);
     let mut all = vec![Component { euler_characteristic: 0, volume: 0.0 }; largest(&of_face) + 1];

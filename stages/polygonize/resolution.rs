@@ -69,35 +69,35 @@ pub(crate) fn choose(ctx: &Ctx<'_>, params: &PolygonizeParams) -> Result<Survey,
     if cells > f64::from(Grid::most_cells(levels)) {
         return Err(PolygonizeError::TooManyCells { cells: cells as u64, limit: params.max_cells });
     }
-    let grid = Grid::new(domain, (cells as u32).clamp(4, most_cells(ctx, &first)), levels);
+    let grid =
+        Grid::new(domain, (cells as u32).clamp(4, most_cells(ctx, &first.complex.grid)), levels);
     let mut chosen = survey(ctx, params.max_cells, grid)?;
     for _ in 0..MOST_FORECASTS {
         if chosen.n_triangles as f64 >= ENOUGH_OF_WANTED * wanted(params) {
             break;
         }
         let cells = forecast(params, &chosen, MOST_GROWTH);
-        let Some(finer) = finer(ctx, params, &chosen, cells)? else { break };
+        let Some(finer) = finer(ctx, params, &chosen.complex.grid, cells)? else { break };
         chosen = finer;
     }
     Ok(chosen)
 }
 
-/// A survey of the same box with more cells, unless that breaks a limit.
+/// A survey of the box of `grid` with more cells, unless that breaks a limit.
 ///
 /// # Errors
 /// [`PolygonizeError::NotANumber`].
 pub(crate) fn finer(
     ctx: &Ctx<'_>,
     params: &PolygonizeParams,
-    survey: &Survey,
+    grid: &Grid,
     cells: f64,
 ) -> Result<Option<Survey>, PolygonizeError> {
-    let grid = &survey.complex.grid;
-    let cells = (cells as u32).min(most_cells(ctx, survey));
+    let cells = (cells as u32).min(most_cells(ctx, grid));
     if cells <= grid.longest() {
         return Ok(None);
     }
-    match self::survey(ctx, params.max_cells, Grid::new(grid.domain, cells, grid.levels)) {
+    match survey(ctx, params.max_cells, Grid::new(grid.domain, cells, grid.levels)) {
         Err(PolygonizeError::TooManyCells { .. }) => Ok(None),
         found => found.map(Some),
     }
@@ -114,8 +114,7 @@ fn forecast(params: &PolygonizeParams, seen: &Survey, most_growth: f64) -> f64 {
     (f64::from(seen.complex.grid.longest()) * growth.min(most_growth)).ceil()
 }
 
-fn most_cells(ctx: &Ctx<'_>, survey: &Survey) -> u32 {
-    let grid = &survey.complex.grid;
+fn most_cells(ctx: &Ctx<'_>, grid: &Grid) -> u32 {
     let most = Grid::most_cells(grid.levels);
     if has_intervals(ctx, grid) { most } else { most.min(MOST_DENSE_CELLS / 2) }
 }
@@ -151,7 +150,7 @@ fn search(ctx: &Ctx<'_>, params: &PolygonizeParams, grid: Grid) -> Result<Survey
 fn survey(ctx: &Ctx<'_>, limit: u32, grid: Grid) -> Result<Survey, PolygonizeError> {
     let cells = surface_cells(ctx, &grid, limit)?;
     let complex = Complex::new(ctx, grid, &cells)?;
-    let n_triangles = Pieces::of(&complex).n_triangles();
+    let n_triangles = Pieces::count(&complex);
     Ok(Survey { cells, complex, n_triangles })
 }
 

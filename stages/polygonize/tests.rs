@@ -98,6 +98,24 @@ fn two_disjoint_spheres_are_two_certified_components() {
     check(text, cube(2.0), 1000, 2, 4);
 }
 
+#[test]
+fn a_mesh_of_many_tiles_keeps_the_topology_and_no_short_edges_along_seams() {
+    // 150 000 triangles before short edges are merged: five tiles and their seams.
+    check(DECCUBE, cube(1.2), 25_000, 1, -24);
+    let field = formula(DECCUBE);
+    let Piece { rows, .. } = run(&field, cube(1.2), &with_faces(25_000)).unwrap();
+    let mesh = rows.view().to_triangles();
+    let lengths: Vec<f64> = (0..mesh.faces.len() as u32)
+        .flat_map(|f| {
+            let [a, b, c] = mesh.corners(f);
+            [(b - a).norm(), (c - b).norm(), (a - c).norm()]
+        })
+        .collect();
+    let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+    let short = lengths.iter().filter(|&&l| l < 0.3 * mean).count();
+    assert!(short as f64 <= 2e-3 * lengths.len() as f64, "{short} of {}", lengths.len());
+}
+
 /// The error of a field in a box with half sides of 1.3.
 fn error_of(text: &str) -> PolygonizeError {
     run(&formula(text), cube(1.3), &with_faces(500)).unwrap_err()
