@@ -42,6 +42,7 @@ readers: build ## read the exports with vtk, trimesh and numpy
 bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50k faces
 	$(CARGO) bench --workspace
 	$(CARGO) run --release -q -p isospline --example stage_times
+	$(CARGO) run --release -q -p isospline --example overlap
 
 reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
 	$(CARGO) run --release -q -p isospline-tests --bin scoreboard
