@@ -70,7 +70,6 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
     pub(crate) fn run(mut self) -> Result<Vec<Option<NodeReport>>, RunError> {
         loop {
             if std::mem::take(&mut self.stirred)
-                && !self.halted()
                 && let Err(error) = self.advance()
             {
                 self.fail((0, 0), error);
@@ -119,6 +118,10 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
     /// Looks at every node once, in order: what is known of earlier ones decides of later ones.
     fn advance(&mut self) -> Result<(), RunError> {
         for idx in 0..self.stands.len() {
+            // What is made is kept, whatever ends the run.
+            if self.halted() && !matches!(self.stands[idx], Stand::Hashed(..)) {
+                continue;
+            }
             if let Stand::Open { known } = self.stands[idx] {
                 self.decide(idx, known)?;
             }

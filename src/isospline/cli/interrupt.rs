@@ -2,6 +2,7 @@
 
 use crate::cli::failure::STOPPED;
 use crate::cli::output::{note, say};
+use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether the user asked to stop, and whether anything listens.
@@ -38,6 +39,10 @@ impl Interrupt {
             }
             note(told);
             std::process::exit(i32::from(STOPPED));
+        }
+        if std::io::stderr().is_terminal() {
+            // Below the bars.
+            note("");
         }
         note("stopping after the work in hand; Ctrl-C again ends at once");
     }

@@ -1,10 +1,11 @@
 //! What a run tells while it goes on: a bar a stage on a terminal, lines elsewhere, JSON if asked.
 
 use crate::cli::output::{duration, note, say};
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use isospline_pipeline::Event;
 use isospline_stage::Counters;
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use std::io::IsTerminal;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -134,11 +135,16 @@ impl Bars {
 /// Rate and time left mean something where there are several steps.
 fn style(in_steps: bool) -> ProgressStyle {
     let template = if in_steps {
-        "{msg:<15} {wide_bar} {percent:>3} % {per_sec:>12} {eta:>4} left"
+        "{msg:<15} {wide_bar} {percent:>3} % {rate:>10} {eta:>4} left"
     } else {
         "{msg:<15} {wide_bar} {percent:>3} %"
     };
-    ProgressStyle::with_template(template).expect("invariant: a fixed template")
+    let rate = |state: &ProgressState, out: &mut dyn Write| {
+        // Nobody can be told of a failure here.
+        let _ = write!(out, "{:.0}/s", state.per_sec());
+    };
+    let style = ProgressStyle::with_template(template).expect("invariant: a fixed template");
+    style.with_key("rate", rate)
 }
 
 fn remarks(counters: &Counters) -> String {

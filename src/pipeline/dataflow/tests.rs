@@ -147,6 +147,23 @@ fn a_fault_at_any_operation_of_a_resumed_run_is_reported_and_repaired_by_the_nex
 }
 
 #[test]
+fn a_stage_whose_rows_are_all_there_is_stored_although_the_run_is_stopped() {
+    let store = MemoryStore::new();
+    let stop = AtomicBool::new(false);
+    // By then the rows of seed are there, hashed or not.
+    let listen = |event: &Event| {
+        if matches!(event, Event::StageStarted { node: 1, .. }) {
+            stop.store(true, Ordering::Relaxed);
+        }
+    };
+    let scene = Scene { field: &NoField, domain: Aabb::EMPTY };
+    let options = RunOptions { stop: &stop, ..options(1, 10) };
+    let failed = Bench::long().pipeline(&store).run(scene, &options, &listen).unwrap_err();
+    assert!(matches!(&failed, RunError::Stopped { stage, .. } if stage == "blend"), "{failed}");
+    assert_eq!(store.names().unwrap(), [FILES[0]]);
+}
+
+#[test]
 fn counters_of_a_resumed_stage_are_those_of_one_run() {
     let bench = Bench::long();
     let counters = |store: &MemoryStore| {
