@@ -31,6 +31,11 @@ use samples::{Interior, Samples};
 use tile_solve::{FIRST_DAMPING, Outcome, Problem};
 use tiling::{Tile, Tiling};
 
+/// A visit that lowers a tile's squared distance by a smaller part than this lets it rest.
+const LITTLE_GAIN: f64 = 0.05;
+/// Sweeps that such a tile rests: plateaus come before the last factor ten, so it is not done.
+const REST: u32 = 3;
+
 /// Lowers the squared normal distance of all patches, tile by tile in colours that share no face.
 #[derive(Clone, Debug)]
 pub struct Relax {
@@ -118,26 +123,40 @@ impl Relax {
         surface: &mut Surface,
     ) -> Result<Counters, RelaxError> {
         let Tiling { tiles, colours } = Tiling::new(&problem.mesh, self.params.tile as usize);
-        let mut damping = vec![FIRST_DAMPING; tiles.len()];
+        let mut states = vec![TileState { damping: FIRST_DAMPING, rest: 0 }; tiles.len()];
         let mut counters = Counters::default();
-        let n_visits = u64::from(self.params.sweeps) * tiles.len() as u64;
-        let mut visited = 0;
-        for colour in std::iter::repeat_n(&colours, self.params.sweeps as usize).flatten() {
-            ctx.host.progress(visited, n_visits)?;
-            let outcomes = map(ctx.host, colour.len(), |i| {
-                problem.visit(&tiles[colour[i]], &surface.interior, damping[colour[i]])
+        let of = u64::from(self.params.sweeps) * colours.len() as u64;
+        let all = std::iter::repeat_n(&colours, self.params.sweeps as usize).flatten();
+        for (done, colour) in all.enumerate() {
+            ctx.host.progress(done as u64, of)?;
+            let (awake, resting): (Vec<usize>, Vec<usize>) =
+                colour.iter().partition(|&&t| states[t].rest == 0);
+            for t in resting {
+                states[t].rest -= 1;
+            }
+            let outcomes = map(ctx.host, awake.len(), |i| {
+                let t = awake[i];
+                problem.visit(&tiles[t], &surface.interior, states[t].damping)
             });
-            for (&t, outcome) in colour.iter().zip(outcomes) {
-                damping[t] = outcome.damping;
+            counters.count("visits", awake.len() as u64);
+            for (t, outcome) in awake.into_iter().zip(outcomes) {
+                let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
+                states[t] = TileState { damping: outcome.damping, rest };
                 counters.count("visits_without_step", u64::from(outcome.interior.is_none()));
                 surface.take(&tiles[t], outcome);
             }
-            visited += colour.len() as u64;
         }
-        counters.count("visits", n_visits);
         counters.count("tiles", tiles.len() as u64);
         Ok(counters)
     }
+}
+
+/// What a tile carries from visit to visit.
+#[derive(Clone, Copy, Debug)]
+struct TileState {
+    damping: f64,
+    /// Sweeps that it sits out.
+    rest: u32,
 }
 
 fn interior(row: &[f64; 45]) -> Interior {
