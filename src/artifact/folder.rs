@@ -2,13 +2,16 @@
 
 #![expect(clippy::disallowed_methods, reason = "artifact files are opened here")]
 
+mod growing;
+
 use crate::commit::{replace_file, sync_folder};
-use crate::store::{Log, Partial, Publish};
+use crate::store::{Log, Partial};
 use crate::{Bytes, Durability, Lock, Store, StoreError};
+use growing::{Draft, Entries, Growing, set_aside};
 use memmap2::Mmap;
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -211,81 +214,6 @@ struct Held {
 
 impl Lock for Held {}
 
-#[derive(Debug)]
-struct Entries {
-    file: File,
-    path: PathBuf,
-}
-
-impl Log for Entries {
-    fn append(&mut self, bytes: &[u8]) -> Result<(), StoreError> {
-        self.file.write_all(bytes).map_err(StoreError::io("write", &self.path))
-    }
-}
-
-/// Names of a file in the making; removes it if it is dropped before it got its final name.
-#[derive(Debug)]
-struct Draft {
-    path: PathBuf,
-    journal: PathBuf,
-    target: PathBuf,
-    durability: Durability,
-    /// Stays when dropped, or has its final name.
-    outlives: bool,
-}
-
-impl Drop for Draft {
-    fn drop(&mut self) {
-        if !self.outlives {
-            // What cannot be removed is overwritten by the next run and never taken for whole.
-            let _ = std::fs::remove_file(&self.path);
-        }
-    }
-}
-
-#[derive(Debug)]
-struct Growing {
-    file: File,
-    draft: Draft,
-    map: Option<Arc<Mapped>>,
-}
-
-impl Partial for Growing {
-    fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), StoreError> {
-        write_all_at(&self.file, bytes, offset).map_err(StoreError::io("write", &self.draft.path))
-    }
-
-    fn shared(&mut self) -> Result<Arc<dyn Bytes>, StoreError> {
-        let map = match &self.map {
-            Some(map) => map,
-            None => self.map.insert(Arc::new(map(&self.file, &self.draft.path)?)),
-        };
-        Ok(Arc::clone(map) as Arc<dyn Bytes>)
-    }
-
-    fn outlive(&mut self) {
-        self.draft.outlives = true;
-    }
-
-    fn freeze(self: Box<Self>) -> Box<dyn Publish> {
-        self
-    }
-}
-
-impl Publish for Growing {
-    fn publish(mut self: Box<Self>) -> Result<(), StoreError> {
-        if self.draft.durability == Durability::Durable {
-            self.file.sync_all().map_err(StoreError::io("sync", &self.draft.path))?;
-        }
-        let renamed = std::fs::rename(&self.draft.path, &self.draft.target);
-        renamed.map_err(StoreError::io("rename", &self.draft.path))?;
-        self.draft.outlives = true;
-        // A journal without its file says nothing; the next run removes it.
-        let _ = std::fs::remove_file(&self.draft.journal);
-        Ok(())
-    }
-}
-
 /// A mapped file; `None` for an empty one, which cannot be mapped.
 #[derive(Debug)]
 struct Mapped(Option<Mmap>);
@@ -312,35 +240,6 @@ fn map(file: &File, path: &Path) -> Result<Mapped, StoreError> {
     // behind the one before it, and artifacts larger than memory can be used.
     let map = unsafe { Mmap::map(file) };
     map.map(|m| Mapped(Some(m))).map_err(StoreError::io("map", path))
-}
-
-#[cfg(unix)]
-fn write_all_at(file: &File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
-    std::os::unix::fs::FileExt::write_all_at(file, bytes, offset)
-}
-
-#[cfg(not(unix))]
-fn write_all_at(mut file: &File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
-    use std::io::{Seek, SeekFrom, Write};
-    file.seek(SeekFrom::Start(offset))?;
-    file.write_all(bytes)
-}
-
-/// Reserves the file's blocks, so that a full disk shows before the work and not after it.
-fn set_aside(file: &File, length: u64) -> std::io::Result<()> {
-    #[cfg(target_os = "linux")]
-    {
-        use rustix::fs::{FallocateFlags, fallocate};
-        use rustix::io::Errno;
-        loop {
-            match fallocate(file, FallocateFlags::empty(), 0, length) {
-                Err(Errno::INTR) => {}
-                Err(Errno::OPNOTSUPP | Errno::NOSYS) => break,
-                done => return Ok(done?),
-            }
-        }
-    }
-    file.set_len(length)
 }
 
 #[cfg(test)]
