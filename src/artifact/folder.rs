@@ -159,7 +159,7 @@ impl FolderStore {
     /// Names of all files, sorted; none if there is no folder.
     fn entries(&self) -> Result<Vec<String>, StoreError> {
         let failed = || StoreError::io("list", &self.folder);
-        let entries = match std::fs::read_dir(&self.folder) {
+        let entries = match read_folder(&self.folder) {
             Ok(entries) => entries,
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
             Err(e) => return Err(failed()(e)),
@@ -186,6 +186,16 @@ impl FolderStore {
             outlives: false,
         };
         Growing { file, draft, map: None }
+    }
+}
+
+/// Opens a folder; the library tries again after a signal for files, but not for folders.
+fn read_folder(path: &Path) -> std::io::Result<std::fs::ReadDir> {
+    loop {
+        match std::fs::read_dir(path) {
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            done => return done,
+        }
     }
 }
 
