@@ -3,31 +3,37 @@
 use crate::heap::WordHeap;
 use isospline_geometry::{EditMesh, HalfEdge};
 
-/// Bits of the high word of a cost that count: sign, exponent and 5 of the mantissa, steps of 3 %.
-const COST_BITS: u32 = !0x7fff;
+/// Bits of the high word of a cost that count in large meshes: sign, exponent and 5 of the
+/// mantissa, steps of 3 %. Edges of equal cost then come in the order of the mesh, where the loop
+/// would otherwise miss the cache at every step.
+const COARSE: u32 = !0x7fff;
+/// Half-edges from which a mesh is large: smaller ones stay in the cache in any order.
+const LARGE: usize = 600_000;
 
 /// Edges by ascending cost, ties by half-edge.
 ///
-/// Costs are kept to 5 bits of mantissa. Finer differences do not matter for the order, and edges
-/// of equal cost come in the order of the mesh: large meshes would otherwise miss the cache at
-/// every step. An entry is one word, for the heap is what the loop waits for; it is current if its
-/// cost is the one last set for its half-edge, and others are skipped when met.
+/// Costs are kept to 20 bits of mantissa at most so that an entry is one word: finer differences
+/// do not matter for the order, and the heap is what the loop waits for. An entry is current if
+/// its cost is the one last set for its half-edge; others are skipped when met.
 #[derive(Debug)]
 pub(crate) struct EdgeQueue {
     heap: WordHeap,
     /// High word of the cost of each half-edge: non-negative floats sort like their bits.
     cost: Vec<u32>,
+    /// The bits of it that count.
+    bits: u32,
 }
 
 impl EdgeQueue {
     /// An empty queue for a mesh with `half_edges` rows.
     pub(crate) fn new(half_edges: usize) -> Self {
-        Self { heap: WordHeap::default(), cost: vec![0; half_edges] }
+        let bits = if half_edges < LARGE { u32::MAX } else { COARSE };
+        Self { heap: WordHeap::default(), cost: vec![0; half_edges], bits }
     }
 
     /// Sets the non-negative cost of the edge `h`, `opposite` without queueing it.
     pub(crate) fn set(&mut self, h: HalfEdge, opposite: HalfEdge, cost: f64) {
-        let high = (cost.to_bits() >> 32) as u32 & COST_BITS;
+        let high = (cost.to_bits() >> 32) as u32 & self.bits;
         self.cost[h.row()] = high;
         self.cost[opposite.row()] = high;
     }
