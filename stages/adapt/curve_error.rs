@@ -38,6 +38,11 @@ pub(crate) struct JudgedEdge<'a> {
     pub(crate) wings: Option<[&'a Vertex; 2]>,
 }
 
+/// Part of the error by [TK, Eq. (9)] that is added to the normal distance. Normal distance alone
+/// lets the inside of patches become the worst place: dodecahedron of 1200 faces 2.7e-8 without
+/// it, 7e-9 to 9e-9 with 1e-3 to 1e-2; torus of 600 1.2e-7, with 1e-2 4e-8.
+const PARAMETRIC_PART: f64 = 1e-2;
+
 /// How curves will be fitted.
 #[derive(Clone, Debug)]
 pub(crate) enum Measure {
@@ -71,7 +76,8 @@ impl Measure {
     }
 }
 
-/// Largest normal distance of the curve of each edge, as the network stage will fit it.
+/// Largest normal distance of the curve of each edge, as the network stage will fit it, and
+/// [`PARAMETRIC_PART`] of the distance of the curve of the paper.
 fn normal_errors_of(fit: &NormalFit, field: &dyn Field, edges: &[JudgedEdge<'_>]) -> Vec<f64> {
     let edge = |JudgedEdge { ends, wings }: &JudgedEdge<'_>| NormalEdge {
         ends: Ends {
@@ -84,8 +90,13 @@ fn normal_errors_of(fit: &NormalFit, field: &dyn Field, edges: &[JudgedEdge<'_>]
     let given: Vec<NormalEdge> = edges.iter().map(edge).collect();
     let curves = fit.fit(field, &given, &vec![None; given.len()]);
     let chord = |[p, q]: &[&Vertex; 2]| (q.position - p.position).norm();
-    let pairs = edges.iter().zip(curves);
-    pairs.map(|(e, curve)| curve.map_or(UNSOUND * chord(&e.ends), |c| c.error)).collect()
+    let parametric = errors_of(field, &edges.iter().map(|e| e.ends).collect::<Vec<_>>());
+    let judged = edges.iter().zip(curves).zip(parametric);
+    judged
+        .map(|((e, curve), parametric)| {
+            curve.map_or(UNSOUND * chord(&e.ends), |c| c.error + PARAMETRIC_PART * parametric)
+        })
+        .collect()
 }
 
 fn slants([a, b]: &[&Vertex; 2], [left, right]: &[&Vertex; 2]) -> [Slant; 2] {
@@ -318,7 +329,7 @@ mod tests {
         let v = vertices_at(&field, &Serial, &ends).unwrap();
         let error = |measure: Measure| measure.errors(&field, &Serial, &[between(&v)])[0];
         let (normal, paper) = (error(Measure::normal()), error(Measure::Paper));
-        assert!(100.0 * normal < paper, "{normal:e} {paper:e}");
+        assert!(50.0 * normal < paper, "{normal:e} {paper:e}");
     }
 
     #[test]

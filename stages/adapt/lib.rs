@@ -35,7 +35,7 @@ pub struct Adapt {
 
 impl Stage for Adapt {
     const NAME: &'static str = "adapt";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
     type Params = AdaptParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();
@@ -115,10 +115,10 @@ impl Adapt {
         surface.measure = Measure::normal();
         let mut cache = ErrorCache::default();
         let error_in = improve::worst_curve_error_rel(surface, &mut cache);
-        counters.max("normal_curve_error_rel_in", error_in);
+        counters.max("normal_score_rel_in", error_in);
         improve::improve(ctx, surface, (&self.params, n_faces), &mut cache, counters)?;
         let error = improve::worst_curve_error_rel(surface, &mut cache);
-        counters.max("normal_curve_error_rel", error);
+        counters.max("normal_score_rel", error);
         Ok(())
     }
 }
