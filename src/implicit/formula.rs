@@ -215,3 +215,24 @@ impl Field for Formula {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formulas_with_kinks_have_no_form_of_second_order_and_blends_have_one() {
+        let has_bends = |text: &str| {
+            let field = Formula::parse(text, &BTreeMap::new()).unwrap();
+            let mut bends = [None];
+            field.bend_enclosures(&[[Interval::new(0.5, 1.0); 3]], &mut bends);
+            bends[0].is_some()
+        };
+        for text in ["abs(x) - 1", "max(x, y)", "mod(x, 2) + z", "atan2(y, x)", "x^y", "sign(z)"] {
+            assert!(!has_bends(text), "{text}");
+        }
+        for text in ["x^2 + y^2 - 1", "smin(x, y, 0.3)", "sqrt(x*y) + sin(z)/x", "x^-2"] {
+            assert!(has_bends(text), "{text}");
+        }
+    }
+}
