@@ -2,12 +2,15 @@
 
 use crate::reliability::dice::Dice;
 use crate::reliability::held::Held;
-use crate::reliability::sample::{PATIENCE, Sample, stage_of};
+use crate::reliability::kill::{chunked, killed};
+use crate::reliability::sample::{PATIENCE, Sample, copy_folder, stage_of};
 use crate::reliability::seal::{Place, places};
 use crate::reliability::{Scale, Tally, process};
 use isospline_artifact::{Container, StoreError};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::process::Command;
+use std::time::Duration;
 
 /// What a byte is changed by: one bit low, one high, all, half, and one in the middle.
 const CHANGES: [u8; 5] = [0x01, 0x80, 0xff, 0x55, 0x10];
@@ -42,6 +45,7 @@ pub(super) fn try_all(scale: Scale, tally: &mut Tally) {
     let bytes: usize = sample.sound.values().map(Vec::len).sum();
     tally.figure(format!("{bytes} bytes in {} artifacts", sample.sound.len()));
     through_the_program(scale, tally, &sample);
+    unfinished(scale, tally);
 }
 
 /// Whether the reader finds the damage and says what `fits`.
@@ -123,4 +127,55 @@ fn rebuilt(sample: &Sample, name: &str, file: &[u8], removed: bool) -> Result<()
         return Err(format!("the run after it: {}", ran.told()));
     }
     sample.is_sound(&store)
+}
+
+/// What a killed run left, its journals and its rows, damaged: the next run takes what can be
+/// trusted and makes the rest.
+fn unfinished(scale: Scale, tally: &mut Tally) {
+    let sample = chunked();
+    let mut dice = Dice::new(33);
+    let (left, folder) = (sample.sandbox.path("left"), sample.sandbox.path("rot"));
+    let n_cases = scale.of(6, 200);
+    let mut n = 0;
+    for _ in 0..20 * n_cases {
+        if n >= n_cases {
+            break;
+        }
+        let _ = std::fs::remove_dir_all(&left);
+        killed(&sample, &left, Duration::from_secs_f64(sample.seconds * dice.unit()));
+        let files = begun(&left);
+        if files.is_empty() {
+            continue;
+        }
+        for _ in 0..5 {
+            let _ = std::fs::remove_dir_all(&folder);
+            copy_folder(&left, &folder);
+            let name = dice.pick(&files);
+            let mut bytes = std::fs::read(folder.join(name)).unwrap_or_default();
+            let at = dice.below(bytes.len());
+            match dice.below(4) {
+                0 => bytes.truncate(at),
+                1 => bytes.extend_from_within(..at),
+                _ => bytes[at] ^= 1 << dice.below(8),
+            }
+            sample.sandbox.write(&format!("rot/{name}"), bytes);
+            tally.case(
+                format!("{name} of a killed run, byte {at}"),
+                sample.resumes(&folder).map(drop),
+            );
+            n += 1;
+        }
+    }
+    tally.figure(format!("{n} journals and rows of killed runs"));
+}
+
+/// Files of artifacts that were begun and not finished.
+fn begun(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter(|entry| entry.metadata().is_ok_and(|data| data.len() > 0));
+    let mut names: Vec<String> =
+        names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.retain(|name| name.ends_with(".partial") || name.ends_with(".journal"));
+    names.sort();
+    names
 }

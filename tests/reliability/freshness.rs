@@ -10,12 +10,13 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 /// Other values of keys whose type does not suggest one.
-const WORDS: [(&str, &[&str]); 6] = [
+const WORDS: [(&str, &[&str]); 7] = [
     ("model.name", &["other"]),
     ("model.formula", &["x^2 + y^2 + z^2 - r - 0.01"]),
     ("model.box", &["[[-1.2, 1.1], [-1.1, 1.1], [-1.1, 1.1]]"]),
     ("model.inside", &["negative"]),
     ("adapt.improve", &["never"]),
+    ("adapt.curves", &["normal"]),
     ("network.method", &["normal", "curvature", "other"]),
 ];
 

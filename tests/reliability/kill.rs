@@ -13,7 +13,7 @@ use std::process::Stdio;
 use std::time::Duration;
 
 /// A model of several chunks a stage, quick because its mesh is given.
-fn chunked() -> Sample {
+pub(crate) fn chunked() -> Sample {
     let mesh = crate::root().join("tests/fixtures/meshes/double_torus_1800.obj");
     let config = std::fs::read_to_string(crate::config_path("double_torus"));
     let config = config.expect("a model file of the repository");
@@ -87,7 +87,7 @@ fn at_random_moments(scale: Scale, tally: &mut Tally, redone: &mut Redone) {
 }
 
 /// Starts a run and kills it; what it had said until then.
-fn killed(sample: &Sample, folder: &Path, moment: Duration) -> String {
+pub(crate) fn killed(sample: &Sample, folder: &Path, moment: Duration) -> String {
     let path = sample.sandbox.path("said");
     let said = std::fs::File::create(&path).expect("a file of the sandbox");
     let mut command = sample.command(folder, &["--json"]);
