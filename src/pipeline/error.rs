@@ -197,8 +197,8 @@ impl fmt::Display for Kept {
 }
 
 fn told(kept: &[Kept]) -> String {
-    let list: Vec<String> = kept.iter().map(|k| format!(", and {k}")).collect();
-    list.concat()
+    let list: Vec<String> = kept.iter().map(ToString::to_string).collect();
+    if list.is_empty() { String::new() } else { format!(", and {}", list.join(", ")) }
 }
 
 impl RunError {

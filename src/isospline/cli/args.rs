@@ -150,7 +150,7 @@ pub(crate) struct RunArgs {
     /// Compare all rows of fresh artifacts with their checksums too, and make damaged ones again
     #[arg(long)]
     pub(crate) verify: bool,
-    /// Write who did what when, to be opened in chrome://tracing or ui.perfetto.dev
+    /// Write who did what when, in the trace format of Chrome; ui.perfetto.dev opens it
     #[arg(long, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
 }

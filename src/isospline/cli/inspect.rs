@@ -21,13 +21,10 @@ pub(crate) fn inspect(file: &Path, verify: bool) -> Result<u8, Failure> {
         return whole(store, &name, &container, verify);
     }
     let name = stem.unwrap_or(&name);
-    match Draft::read(store, name)? {
-        Some(draft) => say(&unfinished(&store.describe(name), &draft)).map(|()| 0),
-        None => {
-            let message = format!("{} is not there", file.display());
-            Err(Failure::damaged(message).helped("see the path"))
-        }
-    }
+    let missing = || Failure::damaged(format!("{} is not there", file.display()));
+    let draft = Draft::read(store, name)?.ok_or_else(|| missing().helped("see the path"))?;
+    say(&unfinished(&store.describe(name), &draft))?;
+    Ok(0)
 }
 
 fn whole(

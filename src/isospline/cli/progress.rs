@@ -102,12 +102,13 @@ impl Bars {
     }
 
     fn begin(&self, node: usize, stage: &str) {
-        let bar = ProgressBar::new(1);
+        // Drawn by all bars together only: a bar of its own would leave lines behind.
+        let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::hidden());
+        let mut running = self.running();
+        let bar = self.all.insert(running.range(..node).count(), bar);
         bar.set_style(style(false));
         bar.set_message(stage.to_owned());
-        let mut running = self.running();
-        let place = running.range(..node).count();
-        running.insert(node, self.all.insert(place, bar));
+        running.insert(node, bar);
     }
 
     fn advance(&self, node: usize, done: u64, of: u64) {
