@@ -3,7 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use isospline_adapt::freeze::freeze;
-use isospline_artifact::kinds::{BaseMesh, Curvature, EdgeSystems, G0Fit, Network, VertexSystems};
+use isospline_artifact::kinds::{
+    BaseMesh, Curvature, EdgeSystems, G0Fit, Network, Patches, VertexSystems,
+};
 use isospline_artifact::{Artifact, SectionSource};
 use isospline_curvature::CurvatureStage;
 use isospline_edge_systems::EdgeSystemsStage;
@@ -12,6 +14,7 @@ use isospline_g0_fit::G0FitStage;
 use isospline_geometry::{Aabb, TriangleMesh};
 use isospline_implicit::{Field, Formula};
 use isospline_network::NetworkStage;
+use isospline_relax::{Relax, RelaxParams};
 use isospline_stage::contract::Fixture;
 use isospline_stage::{Ctx, InputSource, Inputs, Plan, Serial, Stage, Task, stage_contract};
 use isospline_tests::root;
@@ -27,6 +30,7 @@ struct Chain {
     g0_fit: G0Fit,
     vertex_systems: VertexSystems,
     edge_systems: EdgeSystems,
+    patches: Patches,
 }
 
 fn torus() -> Formula {
@@ -81,7 +85,9 @@ fn chain() -> &'static Chain {
         let vertex_systems = run::<VertexSystemsStage>(&[base, shape, curves, fit]);
         let vertices = (VertexSystems::KIND, &vertex_systems as &dyn SectionSource);
         let edge_systems = run::<EdgeSystemsStage>(&[base, curves, fit, vertices]);
-        Chain { base_mesh, curvature, network, g0_fit, vertex_systems, edge_systems }
+        let edges = (EdgeSystems::KIND, &edge_systems as &dyn SectionSource);
+        let patches = run::<Fairing>(&[base, curves, vertices, edges]);
+        Chain { base_mesh, curvature, network, g0_fit, vertex_systems, edge_systems, patches }
     })
 }
 
@@ -154,4 +160,20 @@ mod fairing {
     }
 
     stage_contract!(Fairing, case);
+}
+
+mod relax {
+    use super::*;
+
+    fn case() -> Fixture<Relax> {
+        fixture()
+            .with_params(RelaxParams { sweeps: 1, ..RelaxParams::default() })
+            .with_input(chain().curvature.clone())
+            .with_input(chain().network.clone())
+            .with_input(chain().vertex_systems.clone())
+            .with_input(chain().edge_systems.clone())
+            .with_input(chain().patches.clone())
+    }
+
+    stage_contract!(Relax, case);
 }

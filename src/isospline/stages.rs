@@ -1,6 +1,7 @@
 //! All stages, and the graph of a model: which stages run, and what each reads.
 
 use crate::config::StageParams;
+use isospline_network::Method;
 use isospline_pipeline::{Given, Graph, Node, Registry};
 
 /// Every stage, in the order that numbers the files.
@@ -17,6 +18,7 @@ pub fn registry() -> Registry {
         .with::<isospline_vertex_systems::VertexSystemsStage>()
         .with::<isospline_edge_systems::EdgeSystemsStage>()
         .with::<isospline_fairing::Fairing>()
+        .with::<isospline_relax::Relax>()
 }
 
 /// Stages between the base mesh's shape and the finished patches.
@@ -31,12 +33,17 @@ const SPINE: [&str; 8] = [
     "fairing",
 ];
 
+/// The stage after them where curves are fitted by normal distance. The curves of the paper lie
+/// farther from the surface than patches come without them.
+const RELAXATION: [&str; 1] = ["relax"];
+
 /// The graph of a model: `base_mesh`, if given, takes the place of polygonize and decimate.
 pub fn graph(registry: &Registry, params: &StageParams, base_mesh: Option<&Given>) -> Graph {
     let start: &[&str] =
         if base_mesh.is_some() { &["import"] } else { &["polygonize", "decimate"] };
+    let end: &[&str] = if params.network.method == Method::Normal { &RELAXATION } else { &[] };
     let mut graph = Graph::default();
-    for stage in start.iter().chain(&SPINE) {
+    for stage in start.iter().chain(&SPINE).chain(end) {
         let mut node = Node::new(*stage).with(params.json(stage));
         if *stage == "import" {
             node.given.extend(base_mesh.cloned());

@@ -62,6 +62,7 @@ stage_params! {
     vertex_systems: isospline_vertex_systems::VertexSystemsParams,
     edge_systems: isospline_edge_systems::EdgeSystemsParams,
     fairing: isospline_fairing::FairingParams,
+    relax: isospline_relax::RelaxParams,
 }
 
 fn stage_table<P: Params>(doc: &Document, stage: &str, faces: u32) -> Result<P, ConfigError> {
