@@ -128,8 +128,9 @@ mod tests {
     /// The graph of `c y^2 / 2 + x y` over the triangle (0,0), (1,0), (0.5, side), degree 7.
     fn graph(c: f64, side: f64) -> Net {
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.5, side]];
-        let polar =
-            |p: [f64; 2], q: [f64; 2]| c * p[1] * q[1] / 2.0 + (p[0] * q[1] + p[1] * q[0]) / 2.0;
+        let polar = |p: [f64; 2], q: [f64; 2]| {
+            0.5 * c * p[1] * q[1] + 0.5 * p[0] * q[1] + 0.5 * p[1] * q[0]
+        };
         let mut net = [Vec3::zeros(); 36];
         for e in exponents(DEGREE) {
             let (mut x, mut y, mut z) = (0.0, 0.0, 0.0);
