@@ -34,7 +34,7 @@ pub(crate) struct Knots {
 
 impl Knots {
     /// The surface through torus points: `2 n m` patches.
-    pub(crate) fn surface(n: usize, m: usize) -> Surface {
+    pub(crate) fn surface(n: usize, m: usize) -> Surface<'static> {
         let targets = Self { n, m, points: torus_points(n, m) };
         let control = targets.interpolated();
         let (mut faces, mut nets) = (Vec::new(), Vec::new());

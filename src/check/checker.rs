@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 /// What is checked, and against what.
 pub struct Job<'a> {
     /// The surface.
-    pub surface: &'a Surface,
+    pub surface: &'a Surface<'a>,
     /// The field whose zero set it approximates, `f < 0` inside.
     pub field: &'a dyn Field,
     /// What earlier stages promise.
@@ -126,7 +126,7 @@ impl Parts {
 }
 
 /// Field and gradient at every vertex.
-fn vertex_jets(surface: &Surface, field: &dyn Field, for_each: ForEach<'_>) -> Vec<Jet1> {
+fn vertex_jets(surface: &Surface<'_>, field: &dyn Field, for_each: ForEach<'_>) -> Vec<Jet1> {
     map(for_each, surface.vertices().len(), |range| {
         let points = &surface.vertices()[range];
         let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
@@ -136,7 +136,9 @@ fn vertex_jets(surface: &Surface, field: &dyn Field, for_each: ForEach<'_>) -> V
 }
 
 /// Vertices and control points with a coordinate that is not a finite number.
-fn count_not_finite(surface: &Surface) -> u64 {
-    let points = surface.vertices().iter().chain(surface.nets().iter().flatten());
-    points.filter(|p| !p.iter().all(|x| x.is_finite())).count() as u64
+fn count_not_finite(surface: &Surface<'_>) -> u64 {
+    let lost =
+        |points: &[Vec3]| points.iter().filter(|p| !p.iter().all(|x| x.is_finite())).count() as u64;
+    let in_nets = (0..surface.faces().len()).map(|f| lost(&surface.net(f)));
+    lost(surface.vertices()) + in_nets.sum::<u64>()
 }

@@ -2,7 +2,7 @@
 
 use crate::lent_threads::{ForEach, map};
 use crate::report::{Place, worse};
-use crate::surface::{Net, Surface};
+use crate::surface::Surface;
 use crate::topology::{Joint, Topology};
 use isospline_geometry::bezier_triangle::{DEGREE, boundary_index, first_inner_index};
 use isospline_geometry::{HalfEdge, Vec3};
@@ -24,7 +24,11 @@ pub(crate) struct Continuity {
 /// exact, so both patches are evaluated at the same parameter.
 const N_EDGE_POINTS: usize = 33;
 
-pub(crate) fn measure(surface: &Surface, topology: &Topology, for_each: ForEach<'_>) -> Continuity {
+pub(crate) fn measure(
+    surface: &Surface<'_>,
+    topology: &Topology,
+    for_each: ForEach<'_>,
+) -> Continuity {
     let table = bernstein_table();
     let joints = &topology.joints;
     let edges = map(for_each, joints.len(), |range| {
@@ -45,9 +49,10 @@ pub(crate) fn measure(surface: &Surface, topology: &Topology, for_each: ForEach<
 }
 
 /// Net corners against vertices.
-fn corners(surface: &Surface) -> Continuity {
+fn corners(surface: &Surface<'_>) -> Continuity {
     let (mut gap, mut bits_differ) = (0.0, 0);
-    for (face, net) in surface.faces().iter().zip(surface.nets()) {
+    for (f, face) in surface.faces().iter().enumerate() {
+        let net = surface.net(f);
         for (corner, &v) in face.iter().enumerate() {
             let (p, q) = (net[boundary_index(DEGREE, corner, 0)], surface.vertices()[v as usize]);
             gap = worse(gap, (p - q).norm());
@@ -77,7 +82,7 @@ struct EdgeFigures {
 }
 
 impl EdgeFigures {
-    fn of(surface: &Surface, joint: Joint, table: &[[f64; DEGREE]]) -> Self {
+    fn of(surface: &Surface<'_>, joint: Joint, table: &[[f64; DEGREE]]) -> Self {
         let left = EdgeRows::of(surface, joint.left);
         let right = EdgeRows::of(surface, joint.right);
         let mut out = Self {
@@ -122,8 +127,8 @@ struct EdgeRows {
 }
 
 impl EdgeRows {
-    fn of(surface: &Surface, h: HalfEdge) -> Self {
-        let net: &Net = &surface.nets()[h.face() as usize];
+    fn of(surface: &Surface<'_>, h: HalfEdge) -> Self {
+        let net = surface.net(h.face() as usize);
         let corner = h.corner() as usize;
         Self {
             boundary: std::array::from_fn(|s| net[boundary_index(DEGREE, corner, s)]),

@@ -1,7 +1,7 @@
 //! Jump of the normal curvature across shared edges, from second derivatives of the patches.
 
 use crate::lent_threads::{ForEach, map};
-use crate::surface::{Net, Surface};
+use crate::surface::Surface;
 use crate::topology::{Joint, Topology};
 use isospline_geometry::bezier_triangle::{DEGREE, index};
 use isospline_geometry::{HalfEdge, Vec3};
@@ -23,7 +23,7 @@ const FLAT_REL: f64 = 1e-3;
 /// The normal curvature is taken along the direction normal to the edge in the tangent plane,
 /// from each side; an edge's figure is its largest jump over its largest curvature.
 pub(crate) fn measure(
-    surface: &Surface,
+    surface: &Surface<'_>,
     topology: &Topology,
     for_each: ForEach<'_>,
 ) -> CurvatureJump {
@@ -35,7 +35,7 @@ pub(crate) fn measure(
     percentiles(jumps)
 }
 
-fn relative_jump(surface: &Surface, joint: Joint, flat: f64) -> f64 {
+fn relative_jump(surface: &Surface<'_>, joint: Joint, flat: f64) -> f64 {
     let (left, right) = (Rows::of(surface, joint.left), Rows::of(surface, joint.right));
     let (mut jump, mut scale) = (0.0_f64, flat);
     for i in 0..N_EDGE_POINTS {
@@ -60,9 +60,9 @@ struct Rows {
 }
 
 impl Rows {
-    fn of(surface: &Surface, h: HalfEdge) -> Self {
+    fn of(surface: &Surface<'_>, h: HalfEdge) -> Self {
         // symbols: n the degree; rows b of the net, the boundary first
-        let net: &Net = &surface.nets()[h.face() as usize];
+        let net = surface.net(h.face() as usize);
         let b = |row: usize, s: usize| net[row_index(h.corner() as usize, row, s)];
         let n = DEGREE as f64;
         let m = n * (n - 1.0);
@@ -123,6 +123,7 @@ fn percentiles(mut values: Vec<f64>) -> CurvatureJump {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::Net;
     use isospline_geometry::bezier_triangle::exponents;
 
     /// The graph of `c y^2 / 2 + x y` over the triangle (0,0), (1,0), (0.5, side), degree 7.
@@ -150,7 +151,7 @@ mod tests {
 
     /// Two quadratic graphs that meet along the x axis with the curvatures `left` and `right`
     /// across it at the origin.
-    fn two_graphs(left: f64, right: f64) -> Surface {
+    fn two_graphs(left: f64, right: f64) -> Surface<'static> {
         let (above, below) = (graph(left, 0.8), graph(right, -0.9));
         // The second face runs from (1, 0) to (0, 0): corners 0 and 1 change places.
         let mut turned = below;

@@ -41,11 +41,11 @@ pub(crate) struct Distance {
     pub(crate) not_finite: u64,
 }
 
-pub(crate) fn measure(surface: &Surface, field: &dyn Field, for_each: ForEach<'_>) -> Distance {
+pub(crate) fn measure(surface: &Surface<'_>, field: &dyn Field, for_each: ForEach<'_>) -> Distance {
     let grid = StencilTable::grid(GRID);
-    let faces = map(for_each, surface.nets().len(), |range| {
+    let faces = map(for_each, surface.faces().len(), |range| {
         let mut sampler = Sampler::new(field, &grid);
-        surface.nets()[range].iter().map(|net| sampler.measure(net)).collect()
+        range.map(|f| sampler.measure(&surface.net(f))).collect()
     });
     let n_samples = (faces.len() * grid.stencils().len()) as f64;
     let mut out = Distance {
@@ -71,8 +71,8 @@ pub(crate) fn measure(surface: &Surface, field: &dyn Field, for_each: ForEach<'_
 }
 
 /// The place of `stencil` on face `f`.
-pub(crate) fn place(surface: &Surface, f: usize, stencil: &Stencil, value: f64) -> Place {
-    let point = PreparedPatch::new(&surface.nets()[f]).evaluate(stencil).point.into();
+pub(crate) fn place(surface: &Surface<'_>, f: usize, stencil: &Stencil, value: f64) -> Place {
+    let point = PreparedPatch::new(&surface.net(f)).evaluate(stencil).point.into();
     Place { face: f as u32, barycentric: stencil.at, point, value }
 }
 

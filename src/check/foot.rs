@@ -16,7 +16,7 @@ const MAX_CANDIDATES: usize = 256;
 /// The largest distance of any patch in model units, and where; not-a-number if some sample has
 /// no distance.
 pub(crate) fn largest(
-    surface: &Surface,
+    surface: &Surface<'_>,
     field: &dyn Field,
     distance: &Distance,
 ) -> Option<(f64, Place)> {
@@ -39,7 +39,7 @@ pub(crate) fn largest(
             }
             break;
         }
-        let patch = PreparedPatch::new(&surface.nets()[f]);
+        let patch = PreparedPatch::new(&surface.net(f));
         let (at, estimate) = climb(&patch, field, start.at, on_grid);
         let found = confirmed(patch.evaluate(&at).point, field).unwrap_or(estimate);
         let better = worse(so_far, found);

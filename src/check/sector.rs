@@ -21,7 +21,7 @@ pub(crate) struct Weights {
 /// counter-clockwise and clockwise neighbours. It
 /// lies in (0, 1) exactly if both sectors turn by less than half a turn, that is if `[P,Q] < 0`
 /// and `[R,Q] > 0`; only that is asked, because two wrong signs give a quotient in range.
-pub(crate) fn measure(surface: &Surface, topology: &Topology, normals: &[Vec3]) -> Weights {
+pub(crate) fn measure(surface: &Surface<'_>, topology: &Topology, normals: &[Vec3]) -> Weights {
     let mut out = Weights { out_of_range: 0, min: 1.0, max: 0.0 };
     for &joint in &topology.joints {
         for (h, opposite) in both_ends(joint) {
@@ -43,9 +43,9 @@ fn both_ends(joint: Joint) -> [(HalfEdge, HalfEdge); 2] {
 
 /// First control points along the ccw neighbour of `h`, `h` itself and its cw neighbour, relative
 /// to the vertex that they leave.
-fn spokes(surface: &Surface, h: HalfEdge, opposite: HalfEdge) -> [Vec3; 3] {
+fn spokes(surface: &Surface<'_>, h: HalfEdge, opposite: HalfEdge) -> [Vec3; 3] {
     let from = |h: HalfEdge, s: usize| {
-        surface.nets()[h.face() as usize][boundary_index(DEGREE, h.corner() as usize, s)]
+        surface.net(h.face() as usize)[boundary_index(DEGREE, h.corner() as usize, s)]
     };
     let vertex = from(h, 0);
     let clockwise = opposite.next();

@@ -23,7 +23,8 @@ impl Draft {
     fn sound() -> Self {
         let sound = Knots::surface(24, 12);
         let (vertices, faces) = (sound.vertices().to_vec(), sound.faces().to_vec());
-        Self { vertices, faces, nets: sound.nets().to_vec() }
+        let nets = (0..faces.len()).map(|f| sound.net(f)).collect();
+        Self { vertices, faces, nets }
     }
 
     fn report(self) -> CheckReport {
@@ -42,7 +43,7 @@ impl Draft {
     }
 }
 
-fn report(surface: &Surface) -> CheckReport {
+fn report(surface: &Surface<'_>) -> CheckReport {
     let (params, field) = (CheckParams::default(), torus());
     let (expected, repairs) = (EXPECTED, BTreeMap::new());
     let job = Job { surface, field: &field, expected, params: &params, repairs };

@@ -8,11 +8,19 @@ use isospline_geometry::{Aabb, HalfEdge, Vec3};
 pub type Net = [Vec3; N_CONTROL];
 
 /// Vertices, faces and nets; faces name existing vertices and have a net each.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Surface {
+#[derive(Clone, Debug)]
+pub struct Surface<'a> {
     vertices: Vec<Vec3>,
     faces: Vec<[u32; 3]>,
-    nets: Vec<Net>,
+    nets: Nets<'a>,
+}
+
+/// Where nets come from.
+#[derive(Clone, Debug)]
+enum Nets<'a> {
+    Expanded(Vec<Net>),
+    /// Expanded when they are looked at: a million nets are a gigabyte.
+    Rows(PatchesView<'a>),
 }
 
 /// Why arrays are not a surface at all.
@@ -56,7 +64,7 @@ pub enum SurfaceError {
     },
 }
 
-impl Surface {
+impl<'a> Surface<'a> {
     /// A surface from its arrays.
     ///
     /// # Errors
@@ -70,14 +78,14 @@ impl Surface {
             return Err(SurfaceError::Lengths { faces: faces.len(), nets: nets.len() });
         }
         require_vertices(&faces, vertices.len())?;
-        Ok(Self { vertices, faces, nets })
+        Ok(Self { vertices, faces, nets: Nets::Expanded(nets) })
     }
 
-    /// The surface of a `patches` artifact, expanded.
+    /// The surface of a `patches` artifact, whose nets stay where they are.
     ///
     /// # Errors
     /// Any [`SurfaceError`]: rows with sound checksums may still name what does not exist.
-    pub fn from_patches(patches: &PatchesView<'_>) -> Result<Self, SurfaceError> {
+    pub fn from_patches(patches: &PatchesView<'a>) -> Result<Self, SurfaceError> {
         let meta = patches.meta.first().copied().unwrap_or_default();
         if (meta.degree, meta.boundary_degree, meta.rational) != (DEGREE as u32, 4, 0) {
             let (degree, boundary_degree) = (meta.degree, meta.boundary_degree);
@@ -94,9 +102,8 @@ impl Surface {
                 return Err(SurfaceError::MissingEdge { half_edge, edge, edges });
             }
         }
-        let nets = (0..patches.face.len()).map(|f| patches.net(f)).collect();
         let vertices = patches.position.iter().map(|&p| Vec3::from(p)).collect();
-        Ok(Self { vertices, faces: patches.face.to_vec(), nets })
+        Ok(Self { vertices, faces: patches.face.to_vec(), nets: Nets::Rows(*patches) })
     }
 
     /// Vertex positions.
@@ -109,9 +116,12 @@ impl Surface {
         &self.faces
     }
 
-    /// Control points of each face.
-    pub fn nets(&self) -> &[Net] {
-        &self.nets
+    /// Control points of a face.
+    pub fn net(&self, face: usize) -> Net {
+        match &self.nets {
+            Nets::Expanded(nets) => nets[face],
+            Nets::Rows(patches) => patches.net(face),
+        }
     }
 
     /// Diagonal of the box around the vertices: the unit of relative figures.
@@ -142,12 +152,12 @@ mod tests {
         let net = [Vec3::zeros(); N_CONTROL];
         let vertices = vec![Vec3::zeros(); 3];
         assert_eq!(
-            Surface::new(vertices.clone(), vec![[0, 1, 2]], vec![]),
-            Err(SurfaceError::Lengths { faces: 1, nets: 0 })
+            Surface::new(vertices.clone(), vec![[0, 1, 2]], vec![]).unwrap_err(),
+            SurfaceError::Lengths { faces: 1, nets: 0 }
         );
         assert_eq!(
-            Surface::new(vertices, vec![[0, 1, 3]], vec![net]),
-            Err(SurfaceError::MissingVertex { face: 0, vertex: 3, vertices: 3 })
+            Surface::new(vertices, vec![[0, 1, 3]], vec![net]).unwrap_err(),
+            SurfaceError::MissingVertex { face: 0, vertex: 3, vertices: 3 }
         );
     }
 }

@@ -25,7 +25,7 @@ pub(crate) struct Topology {
 }
 
 impl Topology {
-    pub(crate) fn of(surface: &Surface) -> Self {
+    pub(crate) fn of(surface: &Surface<'_>) -> Self {
         let mut topology = Self {
             joints: Vec::new(),
             n_edges: 0,
@@ -46,12 +46,17 @@ impl Topology {
     }
 
     /// `V - E + F`.
-    pub(crate) fn euler_characteristic(&self, surface: &Surface) -> i64 {
+    pub(crate) fn euler_characteristic(&self, surface: &Surface<'_>) -> i64 {
         surface.vertices().len() as i64 - self.n_edges as i64 + surface.faces().len() as i64
     }
 
     /// Sorts one edge, given by all half-edges along it, into joints and defects.
-    fn enter_edge(&mut self, surface: &Surface, group: &[(u32, u32, u32)], opposite: &mut [u32]) {
+    fn enter_edge(
+        &mut self,
+        surface: &Surface<'_>,
+        group: &[(u32, u32, u32)],
+        opposite: &mut [u32],
+    ) {
         match *group {
             [_] => self.defects.border += 1,
             [(low, _, a), (_, _, b)] => {
@@ -71,7 +76,7 @@ impl Topology {
     }
 
     /// Counts vertices without faces and vertices with more than one fan.
-    fn count_fans(&mut self, surface: &Surface, opposite: &[u32]) {
+    fn count_fans(&mut self, surface: &Surface<'_>, opposite: &[u32]) {
         let mut valence = vec![0; surface.vertices().len()];
         let mut start = vec![ALONE; surface.vertices().len()];
         for h in (0..opposite.len() as u32).map(HalfEdge) {
@@ -93,7 +98,7 @@ impl Topology {
 }
 
 /// `(lower vertex, higher vertex, half-edge)` of all half-edges, sorted.
-fn sorted_half_edges(surface: &Surface) -> Vec<(u32, u32, u32)> {
+fn sorted_half_edges(surface: &Surface<'_>) -> Vec<(u32, u32, u32)> {
     let mut out: Vec<_> = (0..3 * surface.faces().len() as u32)
         .map(|h| {
             let (a, b) = (surface.origin(HalfEdge(h)), surface.origin(HalfEdge(h).next()));
@@ -116,7 +121,7 @@ fn fan_length(opposite: &[u32], start: u32) -> usize {
 }
 
 /// Components in order of their lowest face.
-fn components(surface: &Surface, opposite: &[u32]) -> Vec<Component> {
+fn components(surface: &Surface<'_>, opposite: &[u32]) -> Vec<Component> {
     let mut seen = vec![false; surface.faces().len()];
     let mut out = Vec::new();
     for seed in 0..seen.len() as u32 {
@@ -127,7 +132,7 @@ fn components(surface: &Surface, opposite: &[u32]) -> Vec<Component> {
     out
 }
 
-fn component(surface: &Surface, opposite: &[u32], seed: u32, seen: &mut [bool]) -> Component {
+fn component(surface: &Surface<'_>, opposite: &[u32], seed: u32, seen: &mut [bool]) -> Component {
     let (mut faces, mut n_alone, mut n_paired) = (vec![seed], 0, 0);
     seen[seed as usize] = true;
     let mut next = 0;

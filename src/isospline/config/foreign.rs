@@ -73,7 +73,9 @@ mod tests {
         assert_eq!(model.formula, "x^2+y^2+z^2-a");
         assert_eq!(model.parameters["a"].to_bits(), 1.5_f64.to_bits());
         let Domain::Given(sides) = model.domain else { panic!("{:?}", model.domain) };
-        assert!(sides.iter().all(|[lo, hi]| *lo == -*hi && (hi * hi - 10.0).abs() < 1e-12));
+        assert!(
+            sides.iter().all(|[lo, hi]| (lo + hi).abs() < 1e-15 && (hi * hi - 10.0).abs() < 1e-12)
+        );
     }
 
     #[test]

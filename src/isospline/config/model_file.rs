@@ -1,7 +1,7 @@
 //! The model file: what surface, how many faces, what passes, and the parameters of the stages.
 
 use crate::config::tables::{out_of_range, refuse_unknown_tables, typed};
-use crate::config::{ConfigError, Document, StageParams, foreign_as_toml};
+use crate::config::{ConfigError, Document, Fit, StageParams, foreign_as_toml};
 use isospline_check::CheckParams;
 use isospline_export::LengthUnit;
 use isospline_geometry::{Aabb, Vec3};
@@ -102,6 +102,8 @@ pub struct TargetTable {
     pub faces: u32,
     /// Largest error that passes, relative to the diagonal of the bounding box.
     pub tolerance: Option<f64>,
+    /// How the patches are fitted.
+    pub fit: Fit,
 }
 
 /// Faces where none are asked for: enough for a genus of about five, done in a blink.
@@ -109,7 +111,7 @@ pub const DEFAULT_FACES: u32 = 2000;
 
 impl Default for TargetTable {
     fn default() -> Self {
-        Self { faces: DEFAULT_FACES, tolerance: None }
+        Self { faces: DEFAULT_FACES, tolerance: None, fit: Fit::default() }
     }
 }
 
@@ -184,7 +186,9 @@ impl ModelFile {
         check
             .validate()
             .map_err(|(key, message)| out_of_range(doc, &format!("check.{key}"), message))?;
-        let stages = StageParams::read(doc, target.faces)?;
+        let mut filled = doc.clone();
+        target.fit.fill(&mut filled);
+        let stages = StageParams::read(&filled, target.faces)?;
         Ok(Self { model, target, check, stages })
     }
 }

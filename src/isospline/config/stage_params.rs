@@ -72,12 +72,23 @@ fn stage_table<P: Params>(doc: &Document, stage: &str, faces: u32) -> Result<P, 
         let place = doc.key_place(&key);
         return Err(ConfigError::Elsewhere { key, instead: "target.faces", place });
     }
-    let params: P = sized(&typed(doc, stage, &[])?, faces);
+    let own: P = typed(doc, stage, &[])?;
+    if let Some(key) = not_finite(&own) {
+        return Err(out_of_range(doc, &format!("{stage}.{key}"), "a finite number"));
+    }
+    let params: P = sized(&own, faces);
     params.validate().map_err(|(key, message)| {
         let owner = if key == FACES { "target" } else { stage };
         out_of_range(doc, &format!("{owner}.{key}"), message)
     })?;
     Ok(params)
+}
+
+/// The first key whose value JSON has no word for: infinite, or not a number.
+fn not_finite(params: &impl Params) -> Option<String> {
+    let table = json(params);
+    let found = table.as_object()?.iter().find(|(_, value)| value.is_null());
+    found.map(|(key, _)| key.clone())
 }
 
 fn has_faces(params: &impl Params) -> bool {

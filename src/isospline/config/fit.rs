@@ -1,0 +1,62 @@
+//! `target.fit`: how near the patches come to the surface, and for how much time.
+
+use crate::config::Document;
+use serde::{Deserialize, Serialize};
+
+/// How the patches are fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Fit {
+    /// Curves of normal distance, base mesh driven by their error, patches relaxed to the end.
+    Full,
+    /// As full, with a base mesh judged by the curves of the paper and fewer sweeps.
+    Fast,
+    /// Curves and patches of Tong and Kim [TK].
+    #[default]
+    Paper,
+}
+
+/// Sweeps of a fast fit: further ones gain a factor of about ten and take most of the time.
+const QUICK_SWEEPS: i64 = 2;
+
+impl Fit {
+    /// Puts the parameters of the stages that follow from the fit, where the user wrote none.
+    pub(crate) fn fill(self, doc: &mut Document) {
+        let normal = [("adapt", "curves", "normal"), ("network", "method", "normal")];
+        let values: &[(&str, &str, toml::Value)] = match self {
+            Self::Full => &normal.map(|(table, key, value)| (table, key, value.into())),
+            Self::Fast => {
+                &[("network", "method", "normal".into()), ("relax", "sweeps", QUICK_SWEEPS.into())]
+            }
+            Self::Paper => &[],
+        };
+        for (table, key, value) in values {
+            let written = doc.table().get(table).is_some_and(|table| table.get(key).is_some());
+            if !written {
+                doc.put(table, key, value.clone());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::ModelFile;
+
+    fn chosen(overrides: &[&str]) -> String {
+        let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+        let stages = ModelFile::from_formula("x", &overrides).unwrap().stages;
+        let (curves, method) = (stages.adapt.curves, stages.network.method);
+        format!("{curves:?} {method:?} {}", stages.relax.sweeps)
+    }
+
+    #[test]
+    fn a_fit_sets_the_stages_and_what_the_user_wrote_stays() {
+        assert_eq!(chosen(&[]), "Paper Paper 12");
+        assert_eq!(chosen(&["target.fit=paper"]), "Paper Paper 12");
+        assert_eq!(chosen(&["target.fit=full"]), "Normal Normal 12");
+        assert_eq!(chosen(&["target.fit=fast"]), "Paper Normal 2");
+        let mixed = ["target.fit=full", "relax.sweeps=3", "network.method=paper"];
+        assert_eq!(chosen(&mixed), "Normal Paper 3");
+    }
+}
