@@ -35,7 +35,7 @@ pub struct Adapt {
 
 impl Stage for Adapt {
     const NAME: &'static str = "adapt";
-    const VERSION: u32 = 4;
+    const VERSION: u32 = 5;
     type Params = AdaptParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();
@@ -112,6 +112,8 @@ impl Adapt {
         n_faces: usize,
         counters: &mut Counters,
     ) -> Result<(), AdaptError> {
+        // The rounds so far may have made room for slivers to go.
+        repair::soften(surface, &self.params, counters);
         surface.measure = Measure::normal();
         let mut cache = ErrorCache::default();
         let error_in = improve::worst_curve_error_rel(surface, &mut cache);
