@@ -102,7 +102,9 @@ impl Hunt<'_> {
 /// Defects of exported arrays.
 const DEFECTS: &[Defect] = &[
     ("inner point far off", "error", |d, f| {
-        let shift = d.edge() * ALONG;
+        // Along the normal: a step along the surface would leave it where it is.
+        let (p, q, r) = (d.nets[f][0], d.nets[f][28], d.nets[f][35]);
+        let shift = d.edge() * (q - p).cross(&(r - p)).normalize();
         d.nets[f][interior_indices()[7]] += shift;
     }),
     ("boundary point by one bit", "bits", |d, f| {
@@ -177,7 +179,12 @@ type StoredDefect = (&'static str, &'static str, fn(&mut [u8], usize));
 
 const ROWS: &[StoredDefect] = &[
     ("interior", "error", |row, n| add(row, 3 * (n % 15), 0.3)),
-    ("interior", "angle", |row, n| add(row, 3 * [0, 1, 4, 10, 14, 13][n % 6], 1e-5)),
+    ("interior", "angle", |row, n| {
+        let point = 3 * [0, 1, 4, 10, 14, 13][n % 6];
+        add(row, point, 0.6e-5);
+        add(row, point + 1, -0.48e-5);
+        add(row, point + 2, 0.64e-5);
+    }),
     ("interior", "finite", |row, n| set(row, 7 * n % 45, f64::NAN)),
     ("boundary", "angle", |row, n| add(row, n % 9, 1e-4)),
     ("boundary", "finite", |row, n| set(row, n % 9, f64::INFINITY)),
