@@ -30,7 +30,7 @@ impl Fit {
             }
             Self::Paper => &[],
         };
-        for (table, key, value) in values {
+        for &(table, key, ref value) in values {
             let written = doc.table().get(table).is_some_and(|table| table.get(key).is_some());
             if !written {
                 doc.put(table, key, value.clone());
