@@ -57,9 +57,9 @@ fn names_comments_and_spacing_do_not_count() {
         let args = ["run", "model.toml", "--out", "out", "--no-sync", "--json"];
         computed(&sandbox.succeeds(&args).stdout)
     };
-    assert_eq!(torus("a", "(sqrt(x^2 + y^2) - 5)^2 + z^2 - 1").len(), 10);
-    assert_eq!(torus("b", "(sqrt( x^2+y^2 )-5)^2+z^2-1 # a torus"), [""; 0]);
-    assert_ne!(torus("b", "(sqrt(x^2 + y^2) - 5)^2 + z^2 - 1.01").len(), 0);
+    assert_eq!(torus("mm", "(sqrt(x^2 + y^2) - 5)^2 + z^2 - 1").len(), 10);
+    assert_eq!(torus("cm", "(sqrt( x^2+y^2 )-5)^2+z^2-1 # a torus"), [""; 0]);
+    assert_ne!(torus("cm", "(sqrt(x^2 + y^2) - 5)^2 + z^2 - 1.01").len(), 0);
 }
 
 #[test]

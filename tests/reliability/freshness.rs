@@ -10,11 +10,12 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 /// Other values of keys whose type does not suggest one.
-const WORDS: [(&str, &[&str]); 7] = [
+const WORDS: [(&str, &[&str]); 8] = [
     ("model.name", &["other"]),
     ("model.formula", &["x^2 + y^2 + z^2 - r - 0.01"]),
     ("model.box", &["[[-1.2, 1.1], [-1.1, 1.1], [-1.1, 1.1]]"]),
     ("model.inside", &["negative"]),
+    ("target.fit", &["fast"]),
     ("adapt.improve", &["never"]),
     ("adapt.curves", &["normal"]),
     ("network.method", &["normal", "curvature", "other"]),
@@ -30,12 +31,13 @@ const WITHOUT_DEFAULT: [(&str, &str); 4] = [
 ];
 
 /// Stages that a key of `[model]` or `[target]` goes to; of a stage's own table, that stage.
-const OWNERS: [(&str, &[&str]); 5] = [
+const OWNERS: [(&str, &[&str]); 6] = [
     ("model.formula", &STAGES),
     ("model.level", &STAGES),
     ("model.box", &STAGES),
     ("model.parameters.r", &STAGES),
     ("target.faces", &["polygonize", "decimate", "adapt"]),
+    ("target.fit", &["network"]),
 ];
 
 pub(super) fn try_all(scale: Scale, tally: &mut Tally) {
