@@ -11,7 +11,7 @@ pub enum Fit {
     Full,
     /// As full, with a base mesh judged by the curves of the paper and fewer sweeps.
     Fast,
-    /// Curves and patches of Tong and Kim [TK].
+    /// Curves and patches of Tong and Kim [TK, Sec. 4].
     #[default]
     Paper,
 }
