@@ -4,7 +4,7 @@
 //! normal error `t^3 (1-t)^3 (e0 + e1 t + ...)`. Least squares of the parametric distance [TK,
 //! Eq. (9)] leaves `e0` and `e1` as they come; what is free of the curve, tangent lengths, tangent
 //! directions and the middle point, moves it tangentially by the third power of its length and can
-//! cancel both [derived]. So only the normal distance is minimised, damped by Levenberg-Marquardt.
+//! cancel both \[derived\]. So only the normal distance is minimised, damped by Levenberg-Marquardt.
 //! Everything happens in units of the chord.
 
 mod conditions;
