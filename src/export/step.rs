@@ -91,3 +91,66 @@ fn write_solid(
     let voids = References(oriented.iter().copied());
     entities.add(format_args!("BREP_WITH_VOIDS({name},#{outer},({voids}))"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample;
+    use std::collections::{BTreeMap, BTreeSet};
+
+    fn lines(step: StepOptions) -> BTreeMap<u64, String> {
+        let mut out = Vec::new();
+        let options = Options { step, ..Options::default() };
+        write(&sample::ball_and_ring().view(), &options, &mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let entities = text.lines().filter_map(|line| line.strip_prefix('#')?.split_once('='));
+        entities.map(|(number, entity)| (number.parse().unwrap(), entity.to_owned())).collect()
+    }
+
+    fn references(entity: &str) -> impl Iterator<Item = u64> {
+        let parts = entity.split('#').skip(1);
+        parts.map(|part| {
+            let end = part.find(|c: char| !c.is_ascii_digit()).unwrap_or(part.len());
+            part[..end].parse().unwrap()
+        })
+    }
+
+    #[test]
+    fn every_form_names_what_is_there_and_uses_each_edge_once_each_way() {
+        for (compact, pcurves) in [(false, false), (false, true), (true, false), (true, true)] {
+            let lines = lines(StepOptions { compact, pcurves, ..StepOptions::default() });
+            let mut uses = BTreeMap::<u64, BTreeSet<bool>>::new();
+            let mut n_oriented = 0;
+            for entity in lines.values() {
+                assert!(references(entity).all(|n| lines.contains_key(&n)), "{entity}");
+                if entity.starts_with("ORIENTED_EDGE") {
+                    let edge = references(entity).next().unwrap();
+                    assert!(lines[&edge].starts_with("EDGE_CURVE"), "{entity}");
+                    uses.entry(edge).or_default().insert(entity.ends_with(".T.);"));
+                    n_oriented += 1;
+                }
+            }
+            // 200 faces with 300 edges, or three quads a face.
+            assert_eq!(uses.len(), if compact { 300 } else { 1200 });
+            assert_eq!(n_oriented, 2 * uses.len());
+            assert!(uses.values().all(|ways| ways.len() == 2));
+            let on_faces = lines.values().filter(|entity| entity.starts_with("PCURVE")).count();
+            assert_eq!(on_faces, if pcurves { n_oriented } else { 0 });
+        }
+    }
+
+    #[test]
+    fn parameter_curves_of_an_edge_lie_on_the_two_faces_that_use_it() {
+        let lines = lines(StepOptions { pcurves: true, ..StepOptions::default() });
+        let curves = lines.values().filter(|entity| entity.starts_with("SURFACE_CURVE"));
+        for curve in curves {
+            let named: Vec<u64> = references(curve).collect();
+            let points: BTreeSet<u64> = references(&lines[&named[0]]).collect();
+            for pcurve in &named[1..] {
+                let surface = references(&lines[pcurve]).next().unwrap();
+                let net: BTreeSet<u64> = references(&lines[&surface]).collect();
+                assert!(points.is_subset(&net), "{curve}");
+            }
+        }
+    }
+}
