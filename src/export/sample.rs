@@ -14,6 +14,36 @@ pub(crate) fn ball_and_ring() -> Patches {
     bulged(&mesh)
 }
 
+/// The same with a hole in the ball, its shape scaled by -0.4: a third component, Euler
+/// characteristic 4.
+pub(crate) fn hollow_ball_and_ring() -> Patches {
+    const SCALE: f64 = -0.4;
+    const BALL_FACES: usize = 8;
+    let solid = ball_and_ring();
+    let n_edges = solid.boundary.len() as u32;
+    let mut hollow = solid.clone();
+    // The point reflection of a negative scale turns the faces inside out.
+    let scaled = |x: &f64| SCALE * x;
+    let inner = |p: &[f64; 45]| p.each_ref().map(scaled);
+    hollow.position.extend(solid.position[..6].iter().map(|p| p.each_ref().map(scaled)));
+    hollow.interior.extend(solid.interior[..BALL_FACES].iter().map(inner));
+    // The edges of the ball in the order of its half-edges, each once.
+    let mut edges: Vec<u32> = solid.edge_of[..3 * BALL_FACES].to_vec();
+    edges.sort_unstable();
+    edges.dedup();
+    hollow.boundary.extend(edges.iter().map(|&e| {
+        let curve = &solid.boundary[e as usize];
+        curve.each_ref().map(scaled)
+    }));
+    let moved = |e: &u32| n_edges + edges.binary_search(e).expect(EDGE) as u32;
+    hollow.edge_of.extend(solid.edge_of[..3 * BALL_FACES].iter().map(moved));
+    let n_vertices = solid.position.len() as u32;
+    hollow.face.extend(solid.face[..BALL_FACES].iter().map(|face| face.map(|v| v + n_vertices)));
+    hollow
+}
+
+const EDGE: &str = "invariant: a closed mesh has both directions of an edge";
+
 /// Patches over the faces of a mesh whose control points all go through one polynomial map, so
 /// that no two agree by accident.
 fn bulged(mesh: &TriangleMesh) -> Patches {
@@ -26,7 +56,7 @@ fn bulged(mesh: &TriangleMesh) -> Patches {
     edges.sort_unstable();
     let edge_of = |a: u32, b: u32| {
         let row = edges.binary_search(&[a.min(b), a.max(b)]);
-        row.expect("invariant: a closed mesh has both directions of an edge") as u32
+        row.expect(EDGE) as u32
     };
     let at = |v: u32| mesh.positions[v as usize];
     let curve = |&[a, b]: &[u32; 2]| {

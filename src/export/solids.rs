@@ -100,22 +100,6 @@ fn solid_angle([a, b, c]: [Vec3; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::sample;
-    use isospline_artifact::kinds::Patches;
-
-    /// The sample's ball again, scaled about the origin, inside out if the scale is negative.
-    fn with_ball(scale: f64) -> Patches {
-        let mut patches = sample::ball_and_ring();
-        let ball = patches.clone();
-        let (n_vertices, n_edges) = (patches.position.len() as u32, patches.boundary.len() as u32);
-        let n_faces = 8;
-        let scaled = |x: &f64| scale * x;
-        patches.position.extend(ball.position.iter().map(|p| p.map(|x| scale * x)));
-        patches.boundary.extend(ball.boundary.iter().map(|p| p.each_ref().map(scaled)));
-        patches.interior.extend(ball.interior[..n_faces].iter().map(|p| p.each_ref().map(scaled)));
-        patches.face.extend(ball.face[..n_faces].iter().map(|f| f.map(|v| v + n_vertices)));
-        patches.edge_of.extend(ball.edge_of[..3 * n_faces].iter().map(|e| e + n_edges));
-        patches
-    }
 
     #[test]
     fn apart_components_are_solids_of_their_own() {
@@ -128,7 +112,7 @@ mod tests {
 
     #[test]
     fn an_inside_out_component_is_a_void_of_the_solid_around_it() {
-        let patches = with_ball(-0.4);
+        let patches = sample::hollow_ball_and_ring();
         let solids = solids(&patches.view());
         assert_eq!(solids.len(), 2);
         assert_eq!(solids[0].voids.len(), 1);

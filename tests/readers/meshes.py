@@ -1,12 +1,19 @@
-"""Proves that trimesh finds the GLB, OBJ, PLY and STL closed and of the right topology."""
+"""Proves that trimesh, manifold3d and VTK find the triangle meshes closed, of the right topology
+and of one volume."""
 
 import json
 import struct
 
+import manifold3d
 import numpy as np
 import trimesh
+from vtkmodules.vtkFiltersCore import vtkFeatureEdges, vtkMassProperties
+from vtkmodules.vtkIOPLY import vtkPLYReader
 
 from surface import check, surfaces
+
+# Part of the volume that chords may cut off.
+CHORDS = 0.01
 
 
 def require_closed(name, mesh, surface):
@@ -47,6 +54,37 @@ def require_gltf(path):
     check((facing > 0).all(), f"{path.name}: {(facing <= 0).sum()} normals look inward")
 
 
+def require_manifold(path, surface):
+    """The components by manifold3d: as many, and together of the Euler number of the patches."""
+    mesh = trimesh.load(path, force="mesh", process=False)
+    triangles = np.asarray(mesh.faces, dtype=np.uint64)
+    solid = manifold3d.Manifold(manifold3d.Mesh64(np.asarray(mesh.vertices), triangles))
+    check(solid.status() == manifold3d.Error.NoError, f"{path.name}: manifold3d: {solid.status()}")
+    parts = solid.decompose()
+    expected = surface.component_volumes()
+    check(len(parts) == len(expected), f"{path.name}: manifold3d finds {len(parts)} parts")
+    euler = sum(2 - 2 * part.genus() for part in parts)
+    check(euler == surface.euler_characteristic(), f"{path.name}: manifold3d: Euler number {euler}")
+    return solid.volume()
+
+
+def require_vtk(path):
+    """No edge with one or three triangles by VTK; returns the volume."""
+    reader = vtkPLYReader()
+    reader.SetFileName(str(path))
+    edges = vtkFeatureEdges()
+    edges.SetInputConnection(reader.GetOutputPort())
+    edges.FeatureEdgesOff()
+    edges.ManifoldEdgesOff()
+    edges.Update()
+    n_open = edges.GetOutput().GetNumberOfCells()
+    check(n_open == 0, f"{path.name}: VTK finds {n_open} open or branching edges")
+    mass = vtkMassProperties()
+    mass.SetInputConnection(reader.GetOutputPort())
+    mass.Update()
+    return mass.GetVolume()
+
+
 for surface in surfaces():
     volumes = []
     for extension in ["glb", "obj", "ply", "stl"]:
@@ -57,6 +95,10 @@ for surface in surfaces():
         require_closed(path.name, mesh, surface)
         volumes.append(mesh.volume)
     require_gltf(surface.beside("glb"))
+    volumes += [require_manifold(surface.beside("ply"), surface), require_vtk(surface.beside("ply"))]
+    exact = sum(surface.component_volumes())
+    off = abs(volumes[0] - exact) / exact
+    check(off < CHORDS, f"{surface.path.stem}: the triangles hold {volumes[0]} of {exact}")
     spread = np.ptp(volumes) / volumes[0]
     check(spread < 1e-6, f"{surface.path.stem}: volumes differ by {spread:.1e}")
     exact = trimesh.load(surface.beside("ply"), force="mesh", process=False).vertices
@@ -64,4 +106,7 @@ for surface in surfaces():
     same = np.array_equal(exact[:n_vertices].view("u8"), surface.vertices.view("u8"))
     check(same, f"{surface.path.stem}: vertices of the PLY differ in bits")
     euler = surface.euler_characteristic()
-    print(f"trimesh: {surface.path.stem}: glb obj ply stl closed, Euler number {euler}")
+    print(
+        f"trimesh, manifold3d, vtk: {surface.path.stem}: glb obj ply stl closed, Euler number {euler}, "
+        f"volumes agree to {spread:.0e}, {off:.0e} off the patches"
+    )
