@@ -4,7 +4,7 @@ use isospline_tests::{Sandbox, config_path, root};
 use std::io::Read;
 use std::process::Stdio;
 
-const SMALL: [&str; 2] = ["--set", "target.faces=600"];
+const SMALL: [&str; 4] = ["--set", "target.faces=600", "--set", "target.fit=paper"];
 
 #[test]
 fn a_formula_alone_becomes_a_surface() {
@@ -99,8 +99,8 @@ fn a_folder_is_checked_without_its_model_file() {
     let sandbox = Sandbox::new();
     let config = std::fs::read_to_string(config_path("torus")).unwrap();
     let model = sandbox.write("torus.toml", config);
-    let args = ["run", "torus.toml", "--out", "out", "--no-sync", SMALL[0], SMALL[1]];
-    sandbox.succeeds(&args);
+    let args = ["run", "torus.toml", "--out", "out", "--no-sync"];
+    sandbox.succeeds(&[&args[..], &SMALL].concat());
     std::fs::remove_file(model).unwrap();
     let report = sandbox.checked();
     for figure in [
@@ -172,9 +172,9 @@ fn inspect_tells_what_an_artifact_holds() {
 #[test]
 fn a_check_that_fails_exits_with_1_and_says_which_limit() {
     let sandbox = Sandbox::new();
-    let args = ["--set", "check.error=1e-12", SMALL[0], SMALL[1]];
     let config = config_path("torus");
-    let run = [&["run", config.as_str(), "--out", "out"], &args[..]].concat();
+    let args = ["run", config.as_str(), "--out", "out", "--set", "check.error=1e-12"];
+    let run = [&args[..], &SMALL].concat();
     let outcome = sandbox.isospline(&run);
     assert_eq!(outcome.code, 1, "{}", outcome.stderr);
     assert!(outcome.stdout.contains("FAILED: rel_error_max"), "{}", outcome.stdout);
@@ -186,7 +186,7 @@ fn a_check_that_fails_exits_with_1_and_says_which_limit() {
 fn json_output_is_one_value_a_line_to_the_end() {
     let sandbox = Sandbox::new();
     let config = config_path("torus");
-    let run = ["run", config.as_str(), "--json", "--out", "out", SMALL[0], SMALL[1]];
+    let run = [&["run", config.as_str(), "--json", "--out", "out"], &SMALL[..]].concat();
     let lines = |text: &str| -> Vec<serde_json::Value> {
         text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     };
@@ -206,7 +206,7 @@ fn a_reader_that_goes_away_is_no_panic() {
     let sandbox = Sandbox::new();
     let config = config_path("torus");
     let mut child = sandbox
-        .command(&["run", config.as_str(), "--json", "--out", "out", SMALL[0], SMALL[1]])
+        .command(&[&["run", config.as_str(), "--json", "--out", "out"], &SMALL[..]].concat())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

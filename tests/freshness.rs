@@ -1,7 +1,7 @@
 //! A run does what is not fresh and nothing else, and says why.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use isospline_tests::Sandbox;
+use isospline_tests::{PAPER_FIT, Sandbox};
 
 const FACES: [&str; 2] = ["--set", "target.faces=600"];
 
@@ -51,7 +51,7 @@ fn names_comments_and_spacing_do_not_count() {
     let torus = |name: &str, formula: &str| {
         let text = format!(
             "[model]\nname = \"{name}\"\nunit = \"{name}\"\nformula = \"{formula}\"\n\
-             box = [[-6.6, 6.6], [-6.6, 6.6], [-1.1, 1.1]]\n[target]\nfaces = 600\n"
+             box = [[-6.6, 6.6], [-6.6, 6.6], [-1.1, 1.1]]\n[target]\nfaces = 600\nfit = \"paper\"\n"
         );
         sandbox.write("model.toml", text);
         let args = ["run", "model.toml", "--out", "out", "--no-sync", "--json"];
@@ -83,8 +83,8 @@ fn a_stage_runs_alone_once_what_it_reads_is_fresh() {
     let sandbox = Sandbox::new();
     let config = isospline_tests::config_path("torus");
     let stage = |name: &str| {
-        let args = ["stage", name, config.as_str(), "--out", "out", "--set", "target.faces=600"];
-        sandbox.isospline(&args)
+        let args = ["stage", name, config.as_str(), "--out", "out"];
+        sandbox.isospline(&[&args[..], &FACES, &PAPER_FIT].concat())
     };
     let early = stage("network");
     assert_eq!(early.code, 31, "{}", early.stderr);

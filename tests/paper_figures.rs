@@ -1,7 +1,7 @@
 //! The method reaches the figures of the paper on meshes that never change.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use isospline_tests::{Sandbox, config_path, number, root};
+use isospline_tests::{PAPER_FIT, Sandbox, config_path, number, root};
 
 /// Relative room above a figure that is printed with two digits.
 const ROOM: f64 = 0.05;
@@ -45,7 +45,7 @@ fn mesh_reaches(config: &str, mesh: &str, row: &Row) -> serde_json::Value {
     let base_mesh = format!("model.base_mesh={}", path.display());
     let config = config_path(config);
     let args = ["run", config.as_str(), "--out", "out", "--no-sync", "--set", base_mesh.as_str()];
-    sandbox.succeeds(&args);
+    sandbox.succeeds(&[&args[..], &PAPER_FIT].concat());
     reaches(&sandbox, mesh, row)
 }
 
@@ -87,7 +87,8 @@ fn an_unfit_chair_is_repaired_and_the_repairs_are_counted() {
     let mesh = root().join("tests/fixtures/meshes/chair_4000.obj");
     let base_mesh = format!("model.base_mesh={}", mesh.display());
     let config = config_path("chair");
-    sandbox.succeeds(&["run", config.as_str(), "--out", "out", "--set", base_mesh.as_str()]);
+    let args = ["run", config.as_str(), "--out", "out", "--set", base_mesh.as_str()];
+    sandbox.succeeds(&[&args[..], &PAPER_FIT].concat());
     let report = sandbox.checked();
     let repairs = report["repairs"].as_object().unwrap();
     let adapted = repairs.iter().filter(|(name, _)| name.starts_with("adapt."));

@@ -18,9 +18,9 @@ pub enum Improve {
 #[serde(rename_all = "kebab-case")]
 pub enum Curves {
     /// `network.method = "normal"`: further rounds move faces to where such curves are worst.
+    #[default]
     Normal,
     /// `network.method = "paper"`.
-    #[default]
     Paper,
 }
 
@@ -56,7 +56,7 @@ impl Default for AdaptParams {
             max_rounds: 40,
             improve: Improve::Auto,
             improve_rounds: 8,
-            curves: Curves::Paper,
+            curves: Curves::Normal,
             normal_rounds: 12,
         }
     }

@@ -7,9 +7,9 @@ use isospline_stage::Params;
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Least normal distance, with free tangent directions: two orders better at the same ends.
+    #[default]
     Normal,
     /// Least squares of the distance to projected chord points [TK, Eq. (9)].
-    #[default]
     Paper,
 }
 
@@ -17,7 +17,7 @@ pub enum Method {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NetworkParams {
-    /// How curves are fitted; default `paper`.
+    /// How curves are fitted; default `normal`.
     pub method: Method,
     /// Equidistant chord points a curve of the paper is fitted to and every curve is measured at,
     /// ends included; 7 to 129, default 17. More than 17 gains nothing.
@@ -30,7 +30,7 @@ pub struct NetworkParams {
 
 impl Default for NetworkParams {
     fn default() -> Self {
-        Self { method: Method::Paper, samples: 17, normal_samples: 12, iterations: 40 }
+        Self { method: Method::Normal, samples: 17, normal_samples: 12, iterations: 40 }
     }
 }
 

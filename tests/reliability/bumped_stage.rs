@@ -46,9 +46,9 @@ impl<S: Stage> Stage for Bumped<S> {
 macro_rules! with_one_bumped {
     ($($stage:ty),* $(,)?) => {
         /// Stages of a model without a base mesh, in their order.
-        pub(crate) const STAGES: [&str; 10] = {
+        pub(crate) const STAGES: [&str; 11] = {
             let names = [$(<$stage>::NAME),*];
-            let mut own = [""; 10];
+            let mut own = [""; 11];
             let mut k = 0;
             while k < own.len() {
                 own[k] = names[k + 1];
@@ -81,6 +81,7 @@ with_one_bumped! {
     isospline_vertex_systems::VertexSystemsStage,
     isospline_edge_systems::EdgeSystemsStage,
     isospline_fairing::Fairing,
+    isospline_relax::Relax,
 }
 
 /// Runs a model into a store with `stage` of the next version; gives the stages that ran.

@@ -12,10 +12,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-const SPHERE: &str = "[model]\nformula = \"x^2+y^2+z^2-1\"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n[target]\nfaces = 200\n";
+const SPHERE: &str = "[model]\nformula = \"x^2+y^2+z^2-1\"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n[target]\nfaces = 200\nfit = \"paper\"\n";
 
 /// A model that takes a second or two.
-const SLOW: &str = "[model]\nformula = \"cos(2*pi*x)+cos(2*pi*y)+cos(2*pi*z)-1.2\"\nbox = [[0.5,2.5],[0.5,2.5],[0.5,2.5]]\n[target]\nfaces = 12000\n";
+const SLOW: &str = "[model]\nformula = \"cos(2*pi*x)+cos(2*pi*y)+cos(2*pi*z)-1.2\"\nbox = [[0.5,2.5],[0.5,2.5],[0.5,2.5]]\n[target]\nfaces = 12000\nfit = \"paper\"\n";
 
 const LIMIT: Duration = Duration::from_mins(2);
 

@@ -88,7 +88,7 @@ const FIELDS: &[Field] = &[
 /// Model files, written out.
 type File = (&'static str, &'static str, Expected);
 
-const SPHERE: &str = "[model]\nformula = \"x^2+y^2+z^2-1\"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n[target]\nfaces = 200\n";
+const SPHERE: &str = "[model]\nformula = \"x^2+y^2+z^2-1\"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n[target]\nfaces = 200\nfit = \"paper\"\n";
 
 const FILES: &[File] = &[
     (
@@ -108,12 +108,12 @@ const FILES: &[File] = &[
     ),
     (
         "a thousand spheres",
-        "[model]\nformula = \"cos(2*pi*x)+cos(2*pi*y)+cos(2*pi*z)-2\"\nbox = [[0.5,10.5],[0.5,10.5],[0.5,10.5]]\n[target]\nfaces = 40000\n",
+        "[model]\nformula = \"cos(2*pi*x)+cos(2*pi*y)+cos(2*pi*z)-2\"\nbox = [[0.5,10.5],[0.5,10.5],[0.5,10.5]]\n[target]\nfaces = 40000\nfit = \"paper\"\n",
         Known(0, "17 s of processor"),
     ),
     (
         "a thousand spheres, too few faces",
-        "[model]\nformula = \"cos(2*pi*x)+cos(2*pi*y)+cos(2*pi*z)-2.5\"\nbox = [[0.5,10.5],[0.5,10.5],[0.5,10.5]]\n[target]\nfaces = 2000\n",
+        "[model]\nformula = \"cos(2*pi*x)+cos(2*pi*y)+cos(2*pi*z)-2.5\"\nbox = [[0.5,10.5],[0.5,10.5],[0.5,10.5]]\n[target]\nfaces = 2000\nfit = \"paper\"\n",
         Exit(24, &["too-few-faces"]),
     ),
     (

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// The model file: a sphere of a hundred faces.
 const SPHERE: &str = "[model]\nformula = \"x^2 + y^2 + z^2 - r\"\nparameters = { r = 1.0 }\n\
-    box = [[-1.1, 1.1], [-1.1, 1.1], [-1.1, 1.1]]\n[target]\nfaces = 100\n";
+    box = [[-1.1, 1.1], [-1.1, 1.1], [-1.1, 1.1]]\n[target]\nfaces = 100\nfit = \"fast\"\n";
 
 /// Longest that a run of a small model may take on a busy machine.
 pub(crate) const PATIENCE: Duration = Duration::from_mins(1);

@@ -15,7 +15,7 @@ const TORUS: &str = "[model]\nformula = \"(sqrt(x^2 + y^2) - 1)^2 + z^2 - 0.16\"
     box = [[-1.5, 1.5], [-1.5, 1.5], [-0.5, 0.5]]\n[target]\nfaces = 500\n";
 
 /// The artifact that holds the finished surface.
-const FINISHED: &str = "11-fairing.isos";
+const FINISHED: &str = "12-relax.isos";
 
 /// A defect: its name, what the failure must say, and how it comes into face `f`.
 type Defect = (&'static str, &'static str, fn(&mut Draft, usize));

@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "lowercase")]
 pub enum Fit {
     /// Curves of normal distance, base mesh driven by their error, patches relaxed to the end.
+    #[default]
     Full,
     /// As full, with a base mesh judged by the curves of the paper and fewer sweeps.
     Fast,
     /// Curves and patches of Tong and Kim [TK, Sec. 4].
-    #[default]
     Paper,
 }
 
@@ -22,13 +22,14 @@ const QUICK_SWEEPS: i64 = 2;
 impl Fit {
     /// Puts the parameters of the stages that follow from the fit, where the user wrote none.
     pub(crate) fn fill(self, doc: &mut Document) {
-        let normal = [("adapt", "curves", "normal"), ("network", "method", "normal")];
         let values: &[(&str, &str, toml::Value)] = match self {
-            Self::Full => &normal.map(|(table, key, value)| (table, key, value.into())),
+            Self::Full => &[],
             Self::Fast => {
-                &[("network", "method", "normal".into()), ("relax", "sweeps", QUICK_SWEEPS.into())]
+                &[("adapt", "curves", "paper".into()), ("relax", "sweeps", QUICK_SWEEPS.into())]
             }
-            Self::Paper => &[],
+            Self::Paper => {
+                &[("adapt", "curves", "paper".into()), ("network", "method", "paper".into())]
+            }
         };
         for &(table, key, ref value) in values {
             let written = doc.table().get(table).is_some_and(|table| table.get(key).is_some());
@@ -52,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_fit_sets_the_stages_and_what_the_user_wrote_stays() {
-        assert_eq!(chosen(&[]), "Paper Paper 12");
+        assert_eq!(chosen(&[]), "Normal Normal 12");
         assert_eq!(chosen(&["target.fit=paper"]), "Paper Paper 12");
         assert_eq!(chosen(&["target.fit=full"]), "Normal Normal 12");
         assert_eq!(chosen(&["target.fit=fast"]), "Paper Normal 2");

@@ -1,5 +1,6 @@
 //! Each stage's time, share and nanoseconds a patch on the decorative cube, at 5 000 and 50 000
-//! faces: `cargo run --release --example stage_times`. The least of several runs, in memory.
+//! faces in the fit of the paper and at 5 000 in the others: `cargo run --release --example
+//! stage_times`. The least of several runs, in memory.
 #![expect(clippy::print_stdout, reason = "a table for people")]
 
 use isospline::config::ModelFile;
@@ -7,17 +8,18 @@ use isospline::{Model, Options, convert};
 use isospline_pipeline::RunOptions;
 use std::path::Path;
 
-/// Faces, and runs of which the fastest counts.
-const SIZES: [(u32, usize); 2] = [(5_000, 5), (50_000, 2)];
+/// Fit, faces, and runs of which the fastest counts.
+const CASES: [(&str, u32, usize); 4] =
+    [("paper", 5_000, 5), ("paper", 50_000, 2), ("fast", 5_000, 3), ("full", 5_000, 1)];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/deccube.toml");
-    let model = Model::new(ModelFile::open(&config, &[])?)?;
     let mut per_patch = Vec::new();
-    for (faces, n_runs) in SIZES {
+    for (fit, faces, n_runs) in CASES {
+        let model = Model::new(ModelFile::open(&config, &[format!("target.fit={fit}")])?)?;
         let times = least_times(&model, faces, n_runs)?;
         let all: f64 = times.iter().map(|t| t.1).sum();
-        println!("{faces} faces, {:.1} ms in stages", 1e3 * all);
+        println!("fit {fit}, {faces} faces, {:.1} ms in stages", 1e3 * all);
         for (stage, seconds) in &times {
             let ns = 1e9 * seconds / f64::from(faces);
             println!(
@@ -29,9 +31,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         per_patch.push(all / f64::from(faces));
     }
     println!(
-        "a patch costs {:.2} times as much at {} faces",
+        "fit paper: a patch costs {:.2} times as much at {} faces",
         per_patch[1] / per_patch[0],
-        SIZES[1].0
+        CASES[1].1
     );
     Ok(())
 }

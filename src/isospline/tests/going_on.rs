@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 
 const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/torus.toml");
+/// Its stages stream; relaxation takes the whole surface.
+const PAPER_FIT: &str = "target.fit=paper";
 
 struct Run {
     folder: tempfile::TempDir,
@@ -26,7 +28,17 @@ impl Run {
     /// Enough faces for a few dozen tasks a stage.
     fn command(&self, more: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_isospline"));
-        command.args(["run", CONFIG, "--set", "target.faces=12000", "--threads", "2", "--out"]);
+        command.args([
+            "run",
+            CONFIG,
+            "--set",
+            PAPER_FIT,
+            "--set",
+            "target.faces=12000",
+            "--threads",
+            "2",
+            "--out",
+        ]);
         command.arg(self.out()).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
@@ -162,7 +174,18 @@ fn a_limit_of_file_sizes_is_an_error_with_the_path() {
     let program = env!("CARGO_BIN_EXE_isospline");
     // 200 blocks of 512 or 1024 bytes: less than the largest artifact, more than a record.
     let limited = format!("ulimit -f 200; exec {program} \"$@\"");
-    let args = ["-c", &limited, "sh", "run", CONFIG, "--set", "target.faces=2000", "--out"];
+    let args = [
+        "-c",
+        &limited,
+        "sh",
+        "run",
+        CONFIG,
+        "--set",
+        PAPER_FIT,
+        "--set",
+        "target.faces=2000",
+        "--out",
+    ];
     let output = shell.args(args).arg(run.out()).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(33), "{told}");
