@@ -8,7 +8,7 @@
 use crate::driver::Frame;
 use crate::provenance::note_name;
 use crate::trace::Lane;
-use crate::{Event, Provenance, RunError, clock};
+use crate::{Event, Provenance, RunError, clock, keeper};
 use crossbeam::channel::{Receiver, Sender, unbounded};
 use isospline_artifact::{Sealed, Store, StoreError};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
@@ -93,5 +93,6 @@ fn publish(store: &dyn Store, finished: Finished) -> Result<Event, StoreError> {
     // The record comes first: a whole artifact without its counters would hide repairs.
     store.write_note(&note_name(&artifact), &provenance.to_json())?;
     sealed.publish()?;
+    keeper::discard(store, &artifact)?;
     Ok(Event::Stored { node, stage: label, artifact })
 }

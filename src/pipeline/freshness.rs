@@ -1,8 +1,9 @@
 //! Which artifacts are what the graph asks for, and why the others are not.
 
+use crate::keeper::Steps;
 use crate::keys::{Ingredient, changes, ingredients, key_of};
 use crate::provenance::InputRecord;
-use crate::{Pipeline, Reason, RunError, StageInfo, read_provenance};
+use crate::{Pipeline, Reason, RunError, StageInfo, keeper, read_provenance};
 use isospline_artifact::{Container, Draft, Identity, Key, StoreError};
 use std::fmt;
 
@@ -37,9 +38,9 @@ pub struct NodeStatus {
 /// An unfinished artifact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Begun {
-    /// Tasks done.
+    /// Tasks done; of a stage without tasks, steps.
     pub done: usize,
-    /// All tasks.
+    /// All of them.
     pub of: usize,
     /// Whether the next run goes on with it; it was begun with something else otherwise.
     pub usable: bool,
@@ -70,12 +71,15 @@ impl fmt::Display for Begun {
 
 /// What an earlier run left of a node that is not fresh.
 pub(crate) fn begun(pipeline: &Pipeline<'_>, node: &Resolved) -> Result<Option<Begun>, StoreError> {
-    let draft = Draft::read(pipeline.store, &node.artifact)?;
-    Ok(draft.and_then(|draft| {
+    let tasks = Draft::read(pipeline.store, &node.artifact)?.and_then(|draft| {
         let (done, of) = draft.tasks()?;
-        let recipe = draft.recorded?.head.recipe;
+        Some((draft.recorded?.head.recipe, done, of))
+    });
+    let steps = keeper::stand(pipeline.store, &node.artifact)?;
+    let steps = steps.map(|(recipe, Steps { done, of })| (recipe, done as usize, of as usize));
+    Ok(tasks.or(steps).map(|(recipe, done, of)| {
         let usable = recipe == node.recipe && pipeline.model.hashable;
-        Some(Begun { done, of, usable })
+        Begun { done, of, usable }
     }))
 }
 

@@ -1,6 +1,7 @@
 //! The pipeline's side of [`Host`]: threads for whole stages, progress, the stop flag.
 
 use crate::Event;
+use crate::keeper::{Keeper, Steps};
 use isospline_stage::{Host, Stopped};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -46,6 +47,8 @@ pub(crate) struct StageHost<'a> {
     pub(crate) pool: &'a Threads,
     pub(crate) stop: &'a AtomicBool,
     pub(crate) events: Listener<'a>,
+    /// For a stage without tasks.
+    pub(crate) keeper: Option<&'a Keeper<'a>>,
 }
 
 impl Host for StageHost<'_> {
@@ -59,5 +62,17 @@ impl Host for StageHost<'_> {
         }
         (self.events)(&Event::Progress { node: self.node, stage: self.label.to_owned(), done, of });
         Ok(())
+    }
+
+    fn kept(&self) -> Option<Vec<u8>> {
+        let (Steps { done, of }, state) = self.keeper?.kept()?;
+        (self.events)(&Event::Resumed { node: self.node, stage: self.label.to_owned(), done, of });
+        Some(state)
+    }
+
+    fn keep(&self, done: u64, of: u64, state: &dyn Fn() -> Vec<u8>) {
+        if let Some(keeper) = self.keeper {
+            keeper.keep(Steps { done, of }, state);
+        }
     }
 }

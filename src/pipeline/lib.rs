@@ -15,6 +15,7 @@ mod finisher;
 pub mod freshness;
 pub mod graph;
 mod host;
+mod keeper;
 pub mod keys;
 mod memory;
 pub mod options;

@@ -4,6 +4,7 @@
 use crate::driver::Frame;
 use crate::erase::{Bundle, Prepared};
 use crate::host::StageHost;
+use crate::keeper::Keeper;
 use crate::readiness::RowOwners;
 use crate::resume::{Opened, open};
 use crate::row_writer::{Made, RowWriter};
@@ -135,7 +136,8 @@ fn whole<'f>(
 ) -> Result<(Result<Hashed, StoreError>, Duration), RunError> {
     let start = clock::now();
     let node = &frame.nodes[idx];
-    let host = host(frame, idx);
+    let keeper = Keeper::of(frame, idx);
+    let host = StageHost { keeper: keeper.as_ref(), ..host(frame, idx) };
     let ctx = Ctx { field: frame.scene.field, domain: frame.scene.domain, host: &host };
     let process = || prepared.process(&ctx, inputs, &Task::default());
     let piece = caught(process).map_err(|f| frame.failed(idx, 0, f))?;
@@ -168,5 +170,6 @@ fn host<'f>(frame: &'f Frame<'f>, node: usize) -> StageHost<'f> {
         pool: &frame.pool,
         stop: frame.options.stop,
         events: frame.events,
+        keeper: None,
     }
 }

@@ -17,6 +17,16 @@ pub trait Host: Sync {
     /// # Errors
     /// [`Stopped`] if the stage is to give up.
     fn progress(&self, done: u64, of: u64) -> Result<(), Stopped>;
+
+    /// The state that an earlier run of the same work [kept](Host::keep) before it was ended; for
+    /// a stage without tasks.
+    fn kept(&self) -> Option<Vec<u8>> {
+        None
+    }
+
+    /// Keeps a state to go on from after `done` of `of` steps, in place of an earlier one; how
+    /// often `state` is asked for is the host's matter. For a stage without tasks.
+    fn keep(&self, _done: u64, _of: u64, _state: &dyn Fn() -> Vec<u8>) {}
 }
 
 /// Results of `make(0) .. make(n - 1)`, by index.

@@ -11,6 +11,7 @@ mod face_moves;
 mod moves;
 mod numbering;
 mod params;
+mod progress;
 mod restore;
 mod samples;
 mod tile_solve;
@@ -26,15 +27,18 @@ use isospline_artifact::kinds::{
 use isospline_fitting::net::point;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task, map};
 use moves::Moves;
+use progress::{Progress, TileState};
 use restore::Conditions;
 use samples::{Interior, Samples};
-use tile_solve::{FIRST_DAMPING, Outcome, Problem};
+use tile_solve::Problem;
 use tiling::{Tile, Tiling};
 
 /// A visit that lowers a tile's squared distance by a smaller part than this lets it rest.
 const LITTLE_GAIN: f64 = 0.05;
 /// Sweeps that such a tile rests: plateaus come before the last factor ten, so it is not done.
 const REST: u32 = 3;
+/// Tiles visited between two looks at the stop signal: well under a second.
+const TILES_BETWEEN_STOPS: usize = 128;
 
 /// Lowers the squared normal distance of all patches, tile by tile in colours that share no face.
 #[derive(Clone, Debug)]
@@ -73,16 +77,22 @@ impl Stage for Relax {
         (): (),
         _: &Task,
     ) -> Result<Piece<Patches>, RelaxError> {
-        let mut surface = Surface {
-            interior: patches.interior.iter().map(interior).collect(),
-            nu: edges.weights.iter().map(|w| w.nu).collect(),
-        };
+        let tiling = Tiling::new(&mesh, self.params.tile as usize);
+        let mut at = Progress::new(
+            patches.interior.iter().map(interior).collect(),
+            edges.weights.iter().map(|w| w.nu).collect(),
+            tiling.tiles.len(),
+        );
         let samples = Samples::new(self.params.grid);
         let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
         let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
-        let mut counters = self.sweep(ctx, &problem, &mut surface)?;
+        self.sweep(ctx, &problem, &tiling, &mut at)?;
+        let mut counters = Counters::default();
+        counters.count("tiles", tiling.tiles.len() as u64);
+        counters.count("visits", at.visits);
+        counters.count("visits_without_step", at.idle_visits);
         let conditions = Conditions { mesh, curvature, network, vertices };
-        let restored = conditions.restore(ctx.host, &mut surface.interior, &surface.nu);
+        let restored = conditions.restore(ctx.host, &mut at.interior, &at.nu);
         counters.merge(&restored);
         let rows = Patches {
             meta: patches.meta.to_vec(),
@@ -90,27 +100,9 @@ impl Stage for Relax {
             face: patches.face.to_vec(),
             edge_of: patches.edge_of.to_vec(),
             boundary: patches.boundary.to_vec(),
-            interior: surface.interior.iter().map(flat).collect(),
+            interior: at.interior.iter().map(flat).collect(),
         };
         Ok(Piece { rows, counters })
-    }
-}
-
-/// What the moves change.
-struct Surface {
-    interior: Vec<Interior>,
-    /// The free scalar of each edge.
-    nu: Vec<f64>,
-}
-
-impl Surface {
-    fn take(&mut self, tile: &Tile, outcome: Outcome) {
-        for (&f, points) in tile.faces.iter().zip(outcome.interior.unwrap_or_default()) {
-            self.interior[f as usize] = points;
-        }
-        for (&e, change) in tile.edges.iter().zip(&outcome.nu) {
-            self.nu[e as usize] += change;
-        }
     }
 }
 
@@ -120,43 +112,50 @@ impl Relax {
         &self,
         ctx: &Ctx<'_>,
         problem: &Problem<'_>,
-        surface: &mut Surface,
-    ) -> Result<Counters, RelaxError> {
-        let Tiling { tiles, colours } = Tiling::new(&problem.mesh, self.params.tile as usize);
-        let mut states = vec![TileState { damping: FIRST_DAMPING, rest: 0 }; tiles.len()];
-        let mut counters = Counters::default();
-        let of = u64::from(self.params.sweeps) * colours.len() as u64;
-        let all = std::iter::repeat_n(&colours, self.params.sweeps as usize).flatten();
-        for (done, colour) in all.enumerate() {
-            ctx.host.progress(done as u64, of)?;
-            let (awake, resting): (Vec<usize>, Vec<usize>) =
-                colour.iter().partition(|&&t| states[t].rest == 0);
-            for t in resting {
-                states[t].rest -= 1;
-            }
-            let outcomes = map(ctx.host, awake.len(), |i| {
-                let t = awake[i];
-                problem.visit(&tiles[t], &surface.interior, states[t].damping)
-            });
-            counters.count("visits", awake.len() as u64);
-            for (t, outcome) in awake.into_iter().zip(outcomes) {
-                let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
-                states[t] = TileState { damping: outcome.damping, rest };
-                counters.count("visits_without_step", u64::from(outcome.interior.is_none()));
-                surface.take(&tiles[t], outcome);
-            }
+        tiling: &Tiling,
+        at: &mut Progress,
+    ) -> Result<(), RelaxError> {
+        let of = u64::from(self.params.sweeps) * tiling.colours.len() as u64;
+        if let Some(kept) = ctx.host.kept().and_then(|bytes| at.decode(&bytes)) {
+            *at = kept;
         }
-        counters.count("tiles", tiles.len() as u64);
-        Ok(counters)
+        let all = std::iter::repeat_n(&tiling.colours, self.params.sweeps as usize).flatten();
+        for colour in all.skip(at.colours as usize) {
+            visit(ctx, problem, &tiling.tiles, colour, of, at)?;
+            at.colours += 1;
+            ctx.host.keep(at.colours, of, &|| at.encode());
+        }
+        Ok(())
     }
 }
 
-/// What a tile carries from visit to visit.
-#[derive(Clone, Copy, Debug)]
-struct TileState {
-    damping: f64,
-    /// Sweeps that it sits out.
-    rest: u32,
+/// Visits the tiles of one colour that do not rest.
+fn visit(
+    ctx: &Ctx<'_>,
+    problem: &Problem<'_>,
+    tiles: &[Tile],
+    colour: &[usize],
+    of: u64,
+    at: &mut Progress,
+) -> Result<(), RelaxError> {
+    let (awake, resting): (Vec<usize>, Vec<usize>) =
+        colour.iter().partition(|&&t| at.tiles[t].rest == 0);
+    for t in resting {
+        at.tiles[t].rest -= 1;
+    }
+    for batch in awake.chunks(TILES_BETWEEN_STOPS) {
+        ctx.host.progress(at.colours, of)?;
+        let outcomes = map(ctx.host, batch.len(), |i| {
+            let t = batch[i];
+            problem.visit(&tiles[t], &at.interior, at.tiles[t].damping)
+        });
+        for (&t, outcome) in batch.iter().zip(outcomes) {
+            let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
+            at.tiles[t] = TileState { damping: outcome.damping, rest };
+            at.take(&tiles[t], outcome);
+        }
+    }
+    Ok(())
 }
 
 fn interior(row: &[f64; 45]) -> Interior {

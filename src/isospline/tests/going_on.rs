@@ -11,34 +11,33 @@ use std::process::{Child, ChildStdout, Command, Output, Stdio};
 const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/torus.toml");
 /// Its stages stream; relaxation takes the whole surface.
 const PAPER_FIT: &str = "target.fit=paper";
+/// Enough faces for a few dozen tasks a stage.
+const STREAMING: [&str; 2] = [PAPER_FIT, "target.faces=12000"];
+/// Seconds of relaxation.
+const RELAXING: [&str; 2] = ["target.faces=600", "relax.sweeps=60"];
 
 struct Run {
     folder: tempfile::TempDir,
+    keys: [&'static str; 2],
 }
 
 impl Run {
     fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
+        Self::with(STREAMING)
+    }
+
+    fn with(keys: [&'static str; 2]) -> Self {
+        Self { folder: tempfile::tempdir().unwrap(), keys }
     }
 
     fn out(&self) -> PathBuf {
         self.folder.path().join("out")
     }
 
-    /// Enough faces for a few dozen tasks a stage.
     fn command(&self, more: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_isospline"));
-        command.args([
-            "run",
-            CONFIG,
-            "--set",
-            PAPER_FIT,
-            "--set",
-            "target.faces=12000",
-            "--threads",
-            "2",
-            "--out",
-        ]);
+        let [fit, faces] = self.keys;
+        command.args(["run", CONFIG, "--set", fit, "--set", faces, "--threads", "2", "--out"]);
         command.arg(self.out()).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
@@ -113,6 +112,30 @@ fn killed_at_60_percent_of_g0_fit_the_next_run_continues_there() {
     assert_eq!(g0_fit["resumed_tasks"].as_u64(), Some(done));
     assert!(whole.ends(&[]).status.success());
     assert!(equal(&killed, &whole), "an interruption changes the bytes");
+}
+
+#[test]
+fn killed_within_relax_the_next_run_goes_on_from_the_state_it_kept() {
+    let (killed, whole) = (Run::with(RELAXING), Run::with(RELAXING));
+    let state = killed.out().join("12-relax.isos.state");
+    // Nobody reads what it tells.
+    let mut child = killed.command(&["--json"]).stdout(Stdio::null()).spawn().unwrap();
+    while !state.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "the run ended before");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let begun = killed.status().into_iter().find(|s| s["stage"] == "relax").unwrap();
+    let done = begun["begun"]["done"].as_u64().unwrap();
+    assert!(begun["begun"]["usable"] == true && done > 0, "{begun}");
+
+    let resumed = events(&killed.ends(&["--json"]));
+    let resumed = resumed.iter().find(|e| e["event"] == "resumed").unwrap();
+    assert_eq!((&resumed["stage"], &resumed["done"]), (&"relax".into(), &done.into()));
+    assert!(!state.exists());
+    assert!(whole.ends(&[]).status.success());
+    assert!(equal(&killed, &whole), "the way over a kept state changes the bytes");
 }
 
 #[test]
