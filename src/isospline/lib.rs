@@ -3,6 +3,7 @@
 //! [`convert`] turns a field of the caller's own into a surface in memory; [`ModelFolder`] turns a
 //! model file into a folder of artifacts, as the command line does.
 
+pub mod batch;
 mod box_search;
 pub mod config;
 mod convert;

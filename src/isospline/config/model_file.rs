@@ -193,16 +193,22 @@ impl ModelFile {
     }
 }
 
+/// The file's name without extension, as the name of a folder may be.
 fn name_of(path: &Path) -> String {
-    path.file_stem().map_or_else(|| "model".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    let stem = path.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy());
+    let stem = stem.trim_start_matches('.');
+    stem.chars().map(|c| if is_plain(c) { c } else { '_' }).collect()
+}
+
+fn is_plain(c: char) -> bool {
+    c.is_alphanumeric() || "-_.+".contains(c)
 }
 
 fn validate_model(doc: &Document, model: &ModelTable) -> Result<(), ConfigError> {
     if model.formula.trim().is_empty() {
         return Err(ConfigError::Missing { key: "model.formula" });
     }
-    let plain = |c: char| c.is_alphanumeric() || "-_.+".contains(c);
-    if !model.name.chars().all(plain) || model.name.starts_with('.') {
+    if !model.name.chars().all(is_plain) || model.name.starts_with('.') {
         let range = "letters, digits, `-`, `_`, `.` and `+`: it names a folder";
         return Err(out_of_range(doc, "model.name", range));
     }
