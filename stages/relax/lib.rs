@@ -79,7 +79,9 @@ impl Stage for Relax {
         };
         let samples = Samples::new(self.params.grid);
         let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
-        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
+        let goal = self.params.goal * mesh.bounds[0].diagonal;
+        let (moves, samples, field) = (&moves, &samples, ctx.field);
+        let problem = Problem { mesh, network, moves, samples, field, goal };
         let mut counters = self.sweep(ctx, &problem, &mut surface)?;
         let conditions = Conditions { mesh, curvature, network, vertices };
         let restored = conditions.restore(ctx.host, &mut surface.interior, &surface.nu);
@@ -140,6 +142,8 @@ impl Relax {
             });
             counters.count("visits", awake.len() as u64);
             for (t, outcome) in awake.into_iter().zip(outcomes) {
+                // Its neighbours may move what it shares with them: one that is near is looked at
+                // again too.
                 let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
                 states[t] = TileState { damping: outcome.damping, rest };
                 counters.count("visits_without_step", u64::from(outcome.interior.is_none()));

@@ -38,6 +38,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) moves: &'a Moves,
     pub(crate) samples: &'a Samples,
     pub(crate) field: &'a dyn Field,
+    /// Distance that is near enough, in model units.
+    pub(crate) goal: f64,
 }
 
 /// What a visit leaves behind.
@@ -62,6 +64,9 @@ impl Problem<'_> {
         let here = self.measure(&faces, &interior);
         let nu = vec![0.0; tile.edges.len()];
         let mut outcome = Outcome { interior: None, nu, damping, gain: 0.0 };
+        if here.unsound == 0 && here.largest() <= self.goal {
+            return outcome;
+        }
         for _ in 0..ATTEMPTS {
             if let Some(step) = self.step(tile, &faces, &numbering, &here, outcome.damping) {
                 let trial = step.applied(&interior);
@@ -197,6 +202,10 @@ impl Measured {
             out.sum_sq += d * d;
         }
         out
+    }
+
+    fn largest(&self) -> f64 {
+        self.distance.iter().fold(0.0, |acc: f64, d| acc.max(d.abs()))
     }
 
     fn is_better_than(&self, other: &Self) -> bool {
