@@ -1,10 +1,12 @@
 //! Commands: each takes its arguments and gives an exit code or a failure.
 
 pub(crate) mod args;
+mod batch;
 mod check;
 mod excerpt;
 mod export;
 pub(crate) mod failure;
+mod import;
 mod inspect;
 pub(crate) mod interrupt;
 pub(crate) mod output;
@@ -24,6 +26,11 @@ pub(crate) fn dispatch(args: &Cli, interrupt: &Interrupt) -> u8 {
             interrupt.tells_json(args.model.json);
             (run::run(args, interrupt), args.model.json)
         }
+        Command::Batch(args) => {
+            interrupt.tells_json(args.json);
+            (batch::batch(args, interrupt), args.json)
+        }
+        Command::Import(args) => (import::import(args), false),
         Command::Stage(args) => {
             interrupt.tells_json(args.model.json);
             (run::stage(args, interrupt), args.model.json)

@@ -8,10 +8,12 @@ mod foreign;
 mod model_file;
 mod stage_params;
 mod tables;
+mod target;
 
 pub use document::{Document, Place, Source};
 pub use error::ConfigError;
 pub use fit::Fit;
 pub use foreign::foreign_as_toml;
-pub use model_file::{DEFAULT_FACES, Domain, Inside, ModelFile, ModelTable, TargetTable};
+pub use model_file::{Domain, Inside, ModelFile, ModelTable};
 pub use stage_params::StageParams;
+pub use target::{DEFAULT_FACES, TargetTable};

@@ -1,10 +1,14 @@
 //! A model folder: artifacts, the canonical model file, the last report.
 
+mod rounds;
+
+pub use rounds::{ROUNDS_NOTE, Rounds};
+
 use crate::config::ModelFile;
 use crate::{Model, ModelError, stages};
 use isospline_artifact::kinds::{Mesh, Patches, Topology, TopologyProof};
 use isospline_artifact::{Artifact, Container, Durability, FolderStore, Store, StoreError};
-use isospline_check::{CheckReport, Expected, Job, Surface, SurfaceError};
+use isospline_check::{CheckParams, CheckReport, Expected, Job, Surface, SurfaceError};
 use isospline_pipeline::{
     Event, Graph, ModelKey, NodeStatus, Pipeline, Provenance, Registry, RunError, RunOptions,
     RunReport, Scene, Threads, read_provenance,
@@ -56,7 +60,13 @@ impl ModelFolder {
         let registry = stages::registry();
         let graph = stages::graph(&registry, &model.file.stages, model.base_mesh.as_ref());
         let (key, store) = (model.key(), FolderStore::new(path, durability));
-        Self { model, key, store, registry, graph }
+        let mut folder = Self { model, key, store, registry, graph };
+        if folder.has_rounds()
+            && let Ok(faces) = folder.noted_faces()
+        {
+            folder.graph = folder.sized_graph(faces);
+        }
+        folder
     }
 
     /// The folder at `path` with the model that it holds.
@@ -82,7 +92,8 @@ impl ModelFolder {
         self.store.folder()
     }
 
-    /// Makes what is not fresh, after writing the canonical model file.
+    /// Makes what is not fresh, after writing the canonical model file. A model with a tolerance
+    /// is run for several numbers of faces, until its error is just below it.
     ///
     /// # Errors
     /// See [`RunError`]; what was finished is kept.
@@ -92,6 +103,9 @@ impl ModelFolder {
         on_event: &(dyn Fn(&Event) + Sync),
     ) -> Result<RunReport, RunError> {
         self.save_model()?;
+        if self.has_rounds() && options.only.is_none() {
+            return self.run_rounds(options, on_event);
+        }
         let scene = Scene { field: &self.model.field, domain: self.model.domain };
         self.pipeline().run(scene, options, on_event)
     }
@@ -122,18 +136,40 @@ impl ModelFolder {
         self.store().open(&self.registry.artifact_name(node))
     }
 
+    /// Names of the stages of this model, in the order in which they run.
+    pub fn stage_names(&self) -> impl Iterator<Item = &str> {
+        self.graph.nodes.iter().map(|node| node.stage.as_str())
+    }
+
+    /// What the last run of a stage made, all rows verified; `None` if the model has no such stage.
+    ///
+    /// # Errors
+    /// As [`ModelFolder::patches`].
+    pub fn artifact(&self, stage: &str) -> Option<Result<Arc<Container>, StoreError>> {
+        let node = self.graph.nodes.iter().rfind(|node| node.stage == stage)?;
+        Some(self.store().open(&self.registry.artifact_name(node)))
+    }
+
     /// Measures the finished surface on as many threads.
     ///
     /// # Errors
     /// [`FolderError::Store`], [`FolderError::Surface`].
     pub fn check(&self, threads: usize) -> Result<CheckReport, FolderError> {
+        self.check_against(&self.model.file.check, threads)
+    }
+
+    fn check_against(
+        &self,
+        limits: &CheckParams,
+        threads: usize,
+    ) -> Result<CheckReport, FolderError> {
         let container = self.patches()?;
         let surface = Surface::from_patches(&container.view::<Patches>()?)?;
         let job = Job {
             surface: &surface,
             field: &self.model.field,
-            expected: self.expected()?,
-            params: &self.model.file.check,
+            expected: self.expected(surface.diagonal())?,
+            params: limits,
             repairs: self.repairs()?,
         };
         let threads = Threads::new(threads);
@@ -183,12 +219,12 @@ impl ModelFolder {
         self.store.write_note(name, bytes)
     }
 
-    fn expected(&self) -> Result<Expected, StoreError> {
+    fn expected(&self, diagonal: f64) -> Result<Expected, StoreError> {
         let topology = self.topology()?.map(|(topology, _)| topology);
         Ok(Expected {
             components: topology.map(|t| t.components),
             euler_characteristic: topology.map(|t| t.euler_characteristic),
-            tolerance: self.model.file.target.tolerance,
+            tolerance: self.model.file.target.tolerance(diagonal),
         })
     }
 

@@ -3,6 +3,7 @@
 //! [`convert`] turns a field of the caller's own into a surface in memory; [`ModelFolder`] turns a
 //! model file into a folder of artifacts, as the command line does.
 
+pub mod batch;
 mod box_search;
 pub mod config;
 mod convert;
@@ -10,9 +11,12 @@ mod folder;
 mod model;
 pub mod report;
 pub mod stages;
+pub mod tolerance;
 
 pub use convert::{Conversion, ConvertError, Options, convert, convert_with_events};
-pub use folder::{BASE_MESH_NOTE, FolderError, MODEL_NOTE, ModelFolder, REPORT_NOTE};
+pub use folder::{
+    BASE_MESH_NOTE, FolderError, MODEL_NOTE, ModelFolder, REPORT_NOTE, ROUNDS_NOTE, Rounds,
+};
 pub use isospline_check::{CheckParams, CheckReport};
 pub use isospline_geometry::{Aabb, TriangleMesh, Vec3};
 pub use isospline_implicit::{ClosureField, Field, InsideError};

@@ -1,6 +1,6 @@
 //! What a conversion did and what came out, as `report.json` holds it.
 
-use crate::ModelFolder;
+use crate::{ModelFolder, Rounds};
 use isospline_artifact::StoreError;
 use isospline_artifact::kinds::TopologyProof;
 use isospline_check::{CheckParams, CheckReport};
@@ -43,8 +43,10 @@ pub struct ConversionReport {
     /// The box `[[x0, x1], [y0, y1], [z0, z1]]`.
     #[serde(rename = "box")]
     pub domain: [[f64; 2]; 3],
-    /// Faces asked for.
+    /// Faces asked for, by the model or by the last round for its tolerance.
     pub target_faces: u32,
+    /// The search for these faces, where the model has a tolerance.
+    pub rounds: Option<Rounds>,
     /// Working threads.
     pub threads: usize,
     /// Wall time of the conversion, without the check.
@@ -68,7 +70,7 @@ impl ConversionReport {
         threads: usize,
         check: CheckReport,
     ) -> Result<Self, StoreError> {
-        let model = folder.model();
+        let (model, rounds) = (folder.model(), folder.rounds()?);
         let (min, max) = (model.domain.min, model.domain.max);
         let peak =
             run.nodes.iter().filter_map(|n| Some(n.provenance.as_ref()?.cost.peak_resident_bytes));
@@ -79,7 +81,8 @@ impl ConversionReport {
             topology: folder.topology()?.map(|(_, proof)| proof_name(proof)),
             sign_turned: model.field.flipped,
             domain: [0, 1, 2].map(|axis| [min[axis], max[axis]]),
-            target_faces: model.file.target.faces,
+            target_faces: rounds.as_ref().map_or(model.file.target.faces(), |r| r.faces),
+            rounds,
             threads,
             seconds: run.seconds,
             peak_resident_bytes: peak.max().unwrap_or(0),
@@ -102,6 +105,7 @@ pub fn fingerprint(folder: &ModelFolder, run: &RunReport) -> String {
         model.key().content,
         limits,
         model.file.target.tolerance,
+        model.file.target.tolerance_abs,
     ]);
     key.to_string()
 }

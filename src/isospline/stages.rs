@@ -21,6 +21,11 @@ pub fn registry() -> Registry {
         .with::<isospline_relax::Relax>()
 }
 
+/// Name and version of every stage.
+pub fn versions() -> Vec<(&'static str, u32)> {
+    registry().stages().map(|stage| (stage.name, stage.version)).collect()
+}
+
 /// Stages between the base mesh's shape and the finished patches.
 const SPINE: [&str; 8] = [
     "project",

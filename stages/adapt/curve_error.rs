@@ -89,12 +89,12 @@ fn normal_errors_of(fit: &NormalFit, field: &dyn Field, edges: &[JudgedEdge<'_>]
     };
     let given: Vec<NormalEdge> = edges.iter().map(edge).collect();
     let curves = fit.fit(field, &given, &vec![None; given.len()]);
-    let chord = |[p, q]: &[&Vertex; 2]| (q.position - p.position).norm();
     let parametric = errors_of(field, &edges.iter().map(|e| e.ends).collect::<Vec<_>>());
-    let judged = edges.iter().zip(curves).zip(parametric);
+    let judged = curves.into_iter().zip(parametric);
     judged
-        .map(|((e, curve), parametric)| {
-            curve.map_or(UNSOUND * chord(&e.ends), |c| c.error + PARAMETRIC_PART * parametric)
+        .map(|(curve, parametric)| {
+            // Without one the curve of the paper stays.
+            curve.map_or(parametric, |c| c.error + PARAMETRIC_PART * parametric)
         })
         .collect()
 }

@@ -14,8 +14,11 @@ use std::cmp::Ordering;
 const FLIP_GAIN: f64 = 1.2;
 /// Part of the edges that are split a round, at most.
 const SPLIT_SHARE: f64 = 0.02;
-/// Edges above this part of the largest error are split.
+/// Edges above this part of a large error are split.
 const SPLIT_ABOVE: f64 = 0.5;
+/// The part of the edges with larger errors than that: they may be beyond mending, and must not
+/// keep the rest from it.
+const OUTLIER_SHARE: f64 = 0.002;
 /// Collapses may leave this part of the error from which edges are split.
 const COLLAPSE_BELOW: f64 = 0.7;
 /// Badness (1 is unfit) that an edit may leave: short of the gate, so that later edits have room.
@@ -130,9 +133,11 @@ impl Score {
 fn split_limit(errors: &[EdgeError]) -> (f64, usize) {
     let mut errors: Vec<f64> = errors.iter().map(|&(_, e)| e).collect();
     let most = ((SPLIT_SHARE * errors.len() as f64) as usize).clamp(1, errors.len());
+    let n_outliers = (OUTLIER_SHARE * errors.len() as f64) as usize;
     let (worse, &mut last, _) = errors.select_nth_unstable_by(most - 1, |x, y| y.total_cmp(x));
-    let worst = worse.iter().copied().fold(last, f64::max);
-    let limit = last.max(SPLIT_ABOVE * worst);
+    worse.sort_unstable_by(|x, y| y.total_cmp(x));
+    let large = worse.get(n_outliers).copied().unwrap_or(last);
+    let limit = last.max(SPLIT_ABOVE * large);
     (limit, errors.iter().filter(|&&e| e >= limit).count())
 }
 

@@ -11,6 +11,15 @@ use isospline_geometry::linear::{cholesky, cholesky_solve};
 
 const ALL: usize = OUTER + INNER;
 
+/// What draws the samples of a face aside, to places where it has no folds.
+#[derive(Clone, Debug)]
+pub(crate) struct Pull {
+    /// Against the squared normal distance, 0 to 1.
+    pub(crate) weight: f64,
+    /// From each place to its sample, in the tangent plane.
+    pub(crate) aside: Vec<Vec3>,
+}
+
 /// The equations of a face with its innermost points eliminated.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
@@ -26,17 +35,20 @@ impl Element {
     /// Half the mean squared distance, linearised in the control points, plus half of `damping`
     /// times their squared shifts.
     ///
-    /// `distance` and unit `normal` of the field at the samples. `None` if the equations are not
+    /// `distance` and unit `normal` of the field at the samples; `pull`, if given, adds half the
+    /// mean squared distance in the tangent planes from other places. `None` if the equations are not
     /// positive definite, which only numbers that are not finite bring about.
     pub(crate) fn new(
         samples: &Samples,
         face: &FaceMoves,
         distance: &[f64],
         normal: &[Vec3],
+        pull: Option<&Pull>,
         damping: f64,
     ) -> Option<Self> {
-        let m = normal_matrix(samples, normal, damping);
-        let g = gradient(samples, distance, normal);
+        let weight = pull.map_or(0.0, |pull| pull.weight);
+        let m = normal_matrix(samples, normal, weight, damping);
+        let g = gradient(samples, distance, normal, pull);
         let (schur, reduced, inner) = condense(&m, &g)?;
         let matrix = face.times(&face.transposed_times(&schur));
         let gradient = face.transposed_times(&reduced.map(|x| [x])).map(|[x]| x);
@@ -67,9 +79,18 @@ fn places() -> [usize; N_INTERIOR] {
     out
 }
 
-/// `M = damping + mean over samples of b b^T (x) N N^T`.
-fn normal_matrix(samples: &Samples, normal: &[Vec3], damping: f64) -> [[f64; ALL]; ALL] {
-    let square = |n: &Vec3| [n.x * n.x, n.x * n.y, n.x * n.z, n.y * n.y, n.y * n.z, n.z * n.z];
+/// `M = damping + mean over samples of b b^T (x) (N N^T + weight (I - N N^T))`.
+fn normal_matrix(
+    samples: &Samples,
+    normal: &[Vec3],
+    weight: f64,
+    damping: f64,
+) -> [[f64; ALL]; ALL] {
+    let square = |n: &Vec3| {
+        let m = (1.0 - weight) * n;
+        let [xx, yy, zz] = [0, 1, 2].map(|k| m[k] * n[k] + weight);
+        [xx, m.x * n.y, m.x * n.z, yy, m.y * n.z, zz]
+    };
     let squares: Vec<[f64; 6]> = normal.iter().map(square).collect();
     let places = places();
     let mut m = [[0.0; ALL]; ALL];
@@ -107,15 +128,21 @@ fn weighted_sums(weights: &[[f64; LANES]], numbers: &[[f64; 6]]) -> [[f64; 6]; L
     sums
 }
 
-fn gradient(samples: &Samples, distance: &[f64], normal: &[Vec3]) -> [f64; ALL] {
+fn gradient(
+    samples: &Samples,
+    distance: &[f64],
+    normal: &[Vec3],
+    pull: Option<&Pull>,
+) -> [f64; ALL] {
     let places = places();
     let scale = 1.0 / distance.len() as f64;
     let mut g = [0.0; ALL];
-    for ((row, d), n) in samples.inner.iter().zip(distance).zip(normal) {
-        let pull = scale * d * n;
+    for (s, row) in samples.inner.iter().enumerate() {
+        let aside = pull.map_or(Vec3::zeros(), |pull| pull.weight * pull.aside[s]);
+        let force = scale * (distance[s] * normal[s] + aside);
         for (place, w) in places.iter().zip(row) {
             for x in 0..3 {
-                g[3 * place + x] += w * pull[x];
+                g[3 * place + x] += w * force[x];
             }
         }
     }

@@ -48,7 +48,7 @@ pub struct Relax {
 
 impl Stage for Relax {
     const NAME: &'static str = "relax";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
     type Params = RelaxParams;
     type Whole<'a> = (
         BaseMeshView<'a>,
@@ -85,7 +85,9 @@ impl Stage for Relax {
         );
         let samples = Samples::new(self.params.grid);
         let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
-        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
+        let goal = self.params.goal * mesh.bounds[0].diagonal;
+        let (moves, samples, field) = (&moves, &samples, ctx.field);
+        let problem = Problem { mesh, network, moves, samples, field, goal };
         self.sweep(ctx, &problem, &tiling, &mut at)?;
         let mut counters = Counters::default();
         counters.count("tiles", tiling.tiles.len() as u64);
@@ -150,6 +152,8 @@ fn visit(
             problem.visit(&tiles[t], &at.interior, at.tiles[t].damping)
         });
         for (&t, outcome) in batch.iter().zip(outcomes) {
+            // Its neighbours may move what it shares with them: one that is near is looked at
+            // again too.
             let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
             at.tiles[t] = TileState { damping: outcome.damping, rest };
             at.take(&tiles[t], outcome);

@@ -16,11 +16,14 @@ pub struct RelaxParams {
     /// Steps a side of the sample grid, 9 to 32, default 12. Below 12 patches of coarse meshes
     /// swing between the samples.
     pub grid: u32,
+    /// Distance at the samples, times the diagonal, below which a tile is left as it is; 0 to 1,
+    /// default 0: all are brought as near as they come.
+    pub goal: f64,
 }
 
 impl Default for RelaxParams {
     fn default() -> Self {
-        Self { sweeps: 12, tile: 2, grid: 12 }
+        Self { sweeps: 12, tile: 2, grid: 12, goal: 0.0 }
     }
 }
 
@@ -31,6 +34,9 @@ impl Params for RelaxParams {
             ("tile", self.tile, 1, 6),
             ("grid", self.grid, 9, 32),
         ];
+        if !(0.0..=1.0).contains(&self.goal) {
+            return Err(("goal", format!("{} is out of range: 0 to 1", self.goal)));
+        }
         for (key, value, low, high) in ranges {
             if !(low..=high).contains(&value) {
                 return Err((key, format!("{value} is out of range: {low} to {high}")));

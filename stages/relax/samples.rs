@@ -5,6 +5,7 @@ use isospline_geometry::bezier_triangle::{
     DEGREE, N_CONTROL, N_INTERIOR, bernstein, boundary_index, exponents, grid, index,
     interior_indices,
 };
+use isospline_geometry::linear::{cholesky, cholesky_solve};
 
 /// The 15 interior control points of a patch, in storage order.
 pub(crate) type Interior = [Vec3; N_INTERIOR];
@@ -14,6 +15,9 @@ pub(crate) const LANES: usize = 4;
 const N_BOUNDARY: usize = N_CONTROL - N_INTERIOR;
 /// Every so many samples the patch is tested for folds: folds are wider than three samples.
 const FOLD_STRIDE: usize = 3;
+/// Steps a side between the places on the boundary that are tested: beside the long side of a
+/// sliver, folds do not reach the samples.
+const RIM_STEPS: usize = 6;
 
 /// Values at the samples, the inner points of a barycentric grid.
 #[derive(Clone, Debug)]
@@ -27,6 +31,10 @@ pub(crate) struct Samples {
     full: Vec<[f64; N_CONTROL]>,
     /// Weights of two tangents, counter-clockwise, at every [`FOLD_STRIDE`]th sample.
     tangents: Vec<[[f64; N_CONTROL]; 2]>,
+    /// Values of all points at places on the boundary, and weights of the two tangents there.
+    rim: Vec<([f64; N_CONTROL], [[f64; N_CONTROL]; 2])>,
+    /// Row of each interior point: its weights of all points in [`Samples::even`].
+    even: [[f64; N_CONTROL]; N_INTERIOR],
     boundary: [usize; N_BOUNDARY],
     interior: [usize; N_INTERIOR],
 }
@@ -42,7 +50,10 @@ impl Samples {
         let inner: Vec<_> = full.iter().map(|row| interior.map(|i| row[i])).collect();
         let boundary = std::array::from_fn(|i| boundary_index(DEGREE, i / DEGREE, i % DEGREE));
         let tangents = places.iter().step_by(FOLD_STRIDE).map(tangent_weights).collect();
-        Self { pairs: pairs(&inner), inner, full, tangents, boundary, interior }
+        let is_rim = |p: &[f64; 3]| p.contains(&0.0) && p.iter().all(|&x| x < 1.0);
+        let rim = grid(RIM_STEPS).filter(is_rim).map(|p| (values(&p), tangent_weights(&p)));
+        let (pairs, rim, even) = (pairs(&inner), rim.collect(), even());
+        Self { inner, pairs, full, tangents, rim, even, boundary, interior }
     }
 
     /// Samples of a patch.
@@ -64,12 +75,25 @@ impl Samples {
         }
     }
 
-    /// Samples whose patch normal points against `normal`.
+    /// Places on the boundary of a patch where [`Samples::folded`] looks; they do not move.
+    pub(crate) fn rim(&self, net: &[Vec3; N_CONTROL]) -> impl Iterator<Item = Vec3> {
+        self.rim.iter().map(|(weights, _)| combine(weights, net))
+    }
+
+    /// Interior points of which each is the mean of its six neighbours in the net: a patch without
+    /// folds wherever its boundary has none worth the name.
+    pub(crate) fn even(&self, net: &[Vec3; N_CONTROL]) -> Interior {
+        self.even.each_ref().map(|weights| combine(weights, net))
+    }
+
+    /// Samples whose patch normal points against `normal`, and places on the boundary where it
+    /// points against `rim_normal`.
     pub(crate) fn folded(
         &self,
         net: &[Vec3; N_CONTROL],
         interior: &Interior,
         normal: &[Vec3],
+        rim_normal: &[Vec3],
     ) -> usize {
         let mut net = *net;
         for (&i, &p) in self.interior.iter().zip(interior) {
@@ -79,8 +103,9 @@ impl Samples {
             let [a, b] = weights.each_ref().map(|row| combine(row, &net));
             a.cross(&b).dot(outward) < 0.0
         };
-        let outward = normal.iter().step_by(FOLD_STRIDE);
-        self.tangents.iter().zip(outward).filter(|pair| is_folded(*pair)).count()
+        let inside = self.tangents.iter().zip(normal.iter().step_by(FOLD_STRIDE));
+        let rim = self.rim.iter().map(|(_, tangents)| tangents).zip(rim_normal);
+        inside.chain(rim).filter(|pair| is_folded(*pair)).count()
     }
 }
 
@@ -99,6 +124,31 @@ fn pairs(inner: &[[f64; N_INTERIOR]]) -> Vec<Vec<[f64; LANES]>> {
         std::array::from_fn(|lane| scale * b[chunk[lane][0]] * b[chunk[lane][1]])
     };
     all.chunks_exact(LANES).map(|chunk| inner.iter().map(|b| product(b, chunk)).collect()).collect()
+}
+
+/// The interior points of a net, each the mean of its six neighbours, from the boundary points.
+fn even() -> [[f64; N_CONTROL]; N_INTERIOR] {
+    let all: Vec<[usize; 3]> = exponents(DEGREE).collect();
+    let interior = interior_indices();
+    let slot = |i: usize| interior.iter().position(|&at| at == i);
+    let mut matrix = [[0.0; N_INTERIOR]; N_INTERIOR];
+    let mut weights = [[0.0; N_CONTROL]; N_INTERIOR];
+    for (row, &i) in interior.iter().enumerate() {
+        matrix[row][row] = 6.0;
+        for (from, to) in [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)] {
+            let mut neighbour = all[i];
+            neighbour[from] -= 1;
+            neighbour[to] += 1;
+            let j = index(neighbour);
+            match slot(j) {
+                Some(column) => matrix[row][column] = -1.0,
+                None => weights[row][j] += 1.0,
+            }
+        }
+    }
+    let factor = cholesky(&matrix).expect("invariant: a net is connected to its boundary");
+    cholesky_solve(&factor, &mut weights);
+    weights
 }
 
 /// Derivatives towards corner 1 and corner 2, away from corner 0.
@@ -139,7 +189,17 @@ mod tests {
         for (p, [_, v, w]) in points.iter().zip(inner) {
             assert!((p - Vec3::new(v, w, 0.0)).norm() < 1e-15);
         }
-        let folded = |side: f64| samples.folded(&net, &interior, &vec![side * Vec3::z(); 55]);
-        assert_eq!([folded(1.0), folded(-1.0)], [0, 19]);
+        let up = |n: usize, side: f64| vec![side * Vec3::z(); n];
+        let folded = |side| samples.folded(&net, &interior, &up(55, side), &up(15, side));
+        assert_eq!([folded(1.0), folded(-1.0)], [0, 19 + 15]);
+    }
+
+    #[test]
+    fn an_even_net_over_a_flat_boundary_is_flat_and_evenly_spaced() {
+        let (samples, net) = (Samples::new(12), flat_net());
+        let even = samples.even(&net);
+        for (p, i) in even.iter().zip(interior_indices()) {
+            assert!((p - net[i]).norm() < 1e-14, "{p} instead of {}", net[i]);
+        }
     }
 }

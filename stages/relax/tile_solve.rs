@@ -1,6 +1,6 @@
 //! Gauss-Newton steps of one tile with the rest of the surface fixed.
 
-use crate::element::Element;
+use crate::element::{Element, Pull};
 use crate::envelope::Envelope;
 use crate::face_moves::FaceMoves;
 use crate::moves::Moves;
@@ -25,6 +25,8 @@ const RELIEF: f64 = 1.0 / 16.0;
 const TIGHTENING: f64 = 10.0;
 /// Steps tried a visit; more than three never paid.
 const ATTEMPTS: u32 = 3;
+/// Weight of even nets against the normal distance while folds are mended.
+const UNFOLDING: f64 = 1e-2;
 /// Longest shift of a control point, times the mean side of its face.
 const SHIFT_CAP: f64 = 0.1;
 /// Damping of the amounts themselves, times that of control points, for moves that shift nothing.
@@ -38,6 +40,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) moves: &'a Moves,
     pub(crate) samples: &'a Samples,
     pub(crate) field: &'a dyn Field,
+    /// Distance that is near enough, in model units.
+    pub(crate) goal: f64,
 }
 
 /// What a visit leaves behind.
@@ -54,19 +58,32 @@ pub(crate) struct Outcome {
 }
 
 impl Problem<'_> {
-    /// One step that lowers the squared distance of the tile's samples, if one of a few does.
+    /// One step that lowers the squared distance of the tile's samples, or mends its folds, if one
+    /// of a few does.
     pub(crate) fn visit(&self, tile: &Tile, surface: &[Interior], damping: f64) -> Outcome {
-        let faces: Vec<Face> = tile.faces.iter().map(|&f| Face::new(self, f as usize)).collect();
-        let numbering = Numbering::new(&self.mesh, tile);
         let interior: Vec<Interior> = tile.faces.iter().map(|&f| surface[f as usize]).collect();
+        let faces = self.faces(tile);
         let here = self.measure(&faces, &interior);
         let nu = vec![0.0; tile.edges.len()];
-        let mut outcome = Outcome { interior: None, nu, damping, gain: 0.0 };
+        let idle = Outcome { interior: None, nu, damping, gain: 0.0 };
+        if here.unsound == 0 && here.largest() <= self.goal {
+            return idle;
+        }
+        let visit =
+            Visit { numbering: Numbering::new(&self.mesh, tile), tile, faces, interior, here };
+        let unfolded = (visit.here.unsound > 0).then(|| self.unfolded(&visit, damping)).flatten();
+        unfolded.unwrap_or_else(|| self.nearer(&visit, idle))
+    }
+
+    /// A step that lowers the squared distance and adds no fold.
+    fn nearer(&self, visit: &Visit<'_>, mut outcome: Outcome) -> Outcome {
+        let here = &visit.here;
+        let no_pull = vec![None; visit.faces.len()];
         for _ in 0..ATTEMPTS {
-            if let Some(step) = self.step(tile, &faces, &numbering, &here, outcome.damping) {
-                let trial = step.applied(&interior);
-                let there = self.measure(&faces, &trial);
-                if there.is_better_than(&here) {
+            if let Some(step) = self.step(visit, &no_pull, outcome.damping) {
+                let trial = step.applied(&visit.interior);
+                let there = self.measure(&visit.faces, &trial);
+                if there.is_better_than(here) {
                     outcome.interior = Some(trial);
                     outcome.nu = step.nu;
                     outcome.damping = (outcome.damping * RELIEF).max(LEAST_DAMPING);
@@ -79,35 +96,85 @@ impl Problem<'_> {
         outcome
     }
 
+    /// A step that draws folded faces to even nets and leaves fewer folds, or as many and the faces
+    /// nearer to those nets. The distance may grow: without folds, later steps lower it further.
+    fn unfolded(&self, visit: &Visit<'_>, damping: f64) -> Option<Outcome> {
+        let here = &visit.here;
+        let pulls = self.pulls(visit, &visit.interior, here);
+        for attempt in 0..ATTEMPTS {
+            let stiffer = damping * TIGHTENING.powi(attempt);
+            let Some(step) = self.step(visit, &pulls, stiffer) else { continue };
+            let trial = step.applied(&visit.interior);
+            let there = self.measure(&visit.faces, &trial);
+            let is_nearer = || strength(&self.pulls(visit, &trial, &there)) < strength(&pulls);
+            if there.unsound < here.unsound || there.unsound == here.unsound && is_nearer() {
+                let (interior, nu) = (Some(trial), step.nu);
+                return Some(Outcome { interior, nu, damping, gain: 1.0 });
+            }
+        }
+        None
+    }
+
+    /// For each face that is folded at the start of the visit, what draws it to an even net.
+    fn pulls(&self, visit: &Visit<'_>, interior: &[Interior], at: &Measured) -> Vec<Option<Pull>> {
+        let n = self.samples.len();
+        let [mut points, mut even] = [0, 1].map(|_| vec![Vec3::zeros(); n]);
+        let mut pull = |i: usize| {
+            let net = &visit.faces[i].net;
+            self.samples.points(net, &interior[i], &mut points);
+            self.samples.points(net, &self.samples.even(net), &mut even);
+            let normals = &at.normal[i * n..(i + 1) * n];
+            let offsets = points.iter().zip(&even).zip(normals);
+            let aside = offsets.map(|((p, e), n)| (p - e) - (p - e).dot(n) * n).collect();
+            Pull { weight: UNFOLDING, aside }
+        };
+        let folds = visit.here.folds.iter().enumerate();
+        folds.map(|(i, &folds)| (folds > 0).then(|| pull(i))).collect()
+    }
+
+    fn faces(&self, tile: &Tile) -> Vec<Face> {
+        let mut faces: Vec<Face> =
+            tile.faces.iter().map(|&f| Face::new(self, f as usize)).collect();
+        let places: Vec<Vec3> = faces.iter().flat_map(|f| self.samples.rim(&f.net)).collect();
+        let jets = self.jets(&places);
+        // A normal that is no number counts neither as a fold nor against one.
+        let mut normals = jets.iter().map(|jet| jet.gradient);
+        for face in &mut faces {
+            let n = self.samples.rim(&face.net).count();
+            face.rim_normal = normals.by_ref().take(n).collect();
+        }
+        faces
+    }
+
+    fn jets(&self, points: &[Vec3]) -> Vec<Jet1> {
+        let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
+        self.field.gradients(points, &mut jets);
+        jets
+    }
+
     fn measure(&self, faces: &[Face], interior: &[Interior]) -> Measured {
         let n = self.samples.len();
         let mut points = vec![Vec3::zeros(); faces.len() * n];
         for ((face, inner), points) in faces.iter().zip(interior).zip(points.chunks_exact_mut(n)) {
             self.samples.points(&face.net, inner, points);
         }
-        let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
-        self.field.gradients(&points, &mut jets);
-        let mut out = Measured::of(&jets);
-        for (i, (face, inner)) in faces.iter().zip(interior).enumerate() {
-            out.unsound += self.samples.folded(&face.net, inner, &out.normal[i * n..(i + 1) * n]);
+        let mut out = Measured::of(&self.jets(&points));
+        for ((face, inner), normals) in faces.iter().zip(interior).zip(out.normal.chunks_exact(n)) {
+            out.folds.push(self.samples.folded(&face.net, inner, normals, &face.rim_normal));
         }
+        out.unsound += out.folds.iter().sum::<usize>();
         out
     }
 
     /// The damped step; `None` where the equations have no finite solution.
-    fn step(
-        &self,
-        tile: &Tile,
-        faces: &[Face],
-        numbering: &Numbering,
-        here: &Measured,
-        damping: f64,
-    ) -> Option<Step> {
+    fn step(&self, visit: &Visit<'_>, pulls: &[Option<Pull>], damping: f64) -> Option<Step> {
+        let Visit { tile, faces, numbering, here, .. } = visit;
         let n = self.samples.len();
         let element = |i: usize| {
             let rows = i * n..(i + 1) * n;
             let (distance, normal) = (&here.distance[rows.clone()], &here.normal[rows]);
-            Element::new(self.samples, &faces[i].moves, distance, normal, damping)
+            let (moves, pull) = (&faces[i].moves, pulls[i].as_ref());
+            Element::new(self.samples, moves, distance, normal, pull, damping)
         };
         let elements = (0..faces.len()).map(element).collect::<Option<Vec<Element>>>()?;
         let amounts = solve(numbering, &elements, damping)?;
@@ -127,6 +194,20 @@ impl Problem<'_> {
     }
 }
 
+/// A tile as a visit finds it.
+struct Visit<'a> {
+    tile: &'a Tile,
+    numbering: Numbering,
+    faces: Vec<Face>,
+    interior: Vec<Interior>,
+    here: Measured,
+}
+
+/// Sum of the squared distances from the places that samples are drawn to.
+fn strength(pulls: &[Option<Pull>]) -> f64 {
+    pulls.iter().flatten().flat_map(|pull| &pull.aside).map(Vec3::norm_squared).sum()
+}
+
 /// A face of the tile.
 struct Face {
     /// Boundary in place, zero inside.
@@ -134,6 +215,8 @@ struct Face {
     moves: FaceMoves,
     /// Mean side.
     size: f64,
+    /// Gradients of the field at the places on the boundary that are tested for folds.
+    rim_normal: Vec<Vec3>,
 }
 
 impl Face {
@@ -142,7 +225,12 @@ impl Face {
         let corners = [0, 1, 2].map(|corner| net[boundary_index(DEGREE, corner, 0)]);
         let side = |k: usize| (corners[k] - corners[(k + 1) % 3]).norm();
         let size = (side(0) + side(1) + side(2)) / 3.0;
-        Self { net, moves: FaceMoves::new(&problem.mesh, problem.moves, face), size }
+        Self {
+            net,
+            moves: FaceMoves::new(&problem.mesh, problem.moves, face),
+            size,
+            rim_normal: Vec::new(),
+        }
     }
 
     /// The part of these shifts that keeps within the cap.
@@ -175,7 +263,9 @@ struct Measured {
     normal: Vec<Vec3>,
     /// Sum of squared distances.
     sum_sq: f64,
-    /// Samples without a distance, and folds.
+    /// Folds of each face.
+    folds: Vec<usize>,
+    /// Samples without a distance, and all folds.
     unsound: usize,
 }
 
@@ -184,7 +274,7 @@ impl Measured {
     fn of(jets: &[Jet1]) -> Self {
         let n = jets.len();
         let (distance, normal) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let mut out = Self { distance, normal, sum_sq: 0.0, unsound: 0 };
+        let mut out = Self { distance, normal, sum_sq: 0.0, folds: Vec::new(), unsound: 0 };
         for jet in jets {
             let slope = jet.gradient.norm();
             let distance = jet.value / slope;
@@ -197,6 +287,10 @@ impl Measured {
             out.sum_sq += d * d;
         }
         out
+    }
+
+    fn largest(&self) -> f64 {
+        self.distance.iter().fold(0.0, |acc: f64, d| acc.max(d.abs()))
     }
 
     fn is_better_than(&self, other: &Self) -> bool {

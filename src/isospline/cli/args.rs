@@ -17,6 +17,8 @@ Exit codes:
     0  done; a check passed
     1  a check did not pass
     2  the command line is wrong
+    3  of a batch, some models have no surface that passes
+    4  of a batch, some runs failed: killed, too long, no room on the disk, a bug
    10  the model file (or a mesh it names) cannot be read
    11  the model file has a bad key or value
    12  the formula cannot be read
@@ -39,6 +41,12 @@ pub(crate) enum Command {
     /// Convert a model: run every stage that is not fresh, then check the surface
     #[command(after_help = RUN_EXAMPLES)]
     Run(RunArgs),
+    /// Convert many models, each in a process of its own; one that fails stops no other
+    #[command(after_help = BATCH_EXAMPLES)]
+    Batch(BatchArgs),
+    /// Write the model file of a model of another program (.jsurf, .vm), to be edited
+    #[command(after_help = IMPORT_EXAMPLES)]
+    Import(ImportArgs),
     /// Run one stage alone; what it reads must be fresh
     #[command(after_help = STAGE_EXAMPLES)]
     Stage(StageArgs),
@@ -79,6 +87,22 @@ Examples:
 The folder is out/<model name>. A second run with nothing changed does nothing; after a change
 only the stages that depend on it run again. A run that was stopped or killed in the middle of a
 stage goes on there.";
+
+const BATCH_EXAMPLES: &str = "\
+Examples:
+  isospline batch library
+  isospline batch a.toml b.jsurf c.vm --out out/three --set target.faces=1000
+  isospline batch library --jobs 4 --timeout 600
+  isospline batch library --out out/library --emit slurm
+
+Of a folder, all *.toml, *.jsurf and *.vm in it and below. DIR/summary.jsonl and DIR/summary.csv tell
+what became of each model, and why. The same command goes on where a batch was stopped or killed;
+models whose outcome is known and whose file is unchanged are not done again.";
+
+const IMPORT_EXAMPLES: &str = "\
+Examples:
+  isospline import bear.vm
+  isospline import kugel.jsurf -o kugel.toml";
 
 const STAGE_EXAMPLES: &str = "\
 Examples:
@@ -153,6 +177,64 @@ pub(crate) struct RunArgs {
     /// Write who did what when, in the trace format of Chrome; ui.perfetto.dev opens it
     #[arg(long, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BatchArgs {
+    /// Model files, and folders of them
+    #[arg(value_name = "DIR|FILE", required = true)]
+    pub(crate) sources: Vec<PathBuf>,
+    /// The folder of the batch; default out/<name of the folder of models>
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Models at work at the same time; default: the processors over --threads
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) jobs: Option<u32>,
+    /// Working threads of each; default: the processors over --jobs
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+    /// Go on although the disk is full or no thread can be started
+    #[arg(long)]
+    pub(crate) keep_going: bool,
+    /// End a model that takes longer; default: none is ended
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) timeout: Option<u64>,
+    /// Sets a key of all model files, such as target.faces=2000; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) overrides: Vec<String>,
+    /// Do not wait for the disk: survives a kill, not a power cut
+    #[arg(long)]
+    pub(crate) no_sync: bool,
+    /// Print what became of each model as JSON, one a line
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Only this model, named as in the summary, with a record of its own; may be repeated
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) only: Vec<String>,
+    /// Write a script that carries out the batch on a cluster, one model a task
+    #[arg(long, value_enum, value_name = "SCHEDULER")]
+    pub(crate) emit: Option<SchedulerArg>,
+}
+
+/// What carries out the tasks of a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum SchedulerArg {
+    /// A job array, for sbatch
+    Slurm,
+    /// A Snakefile
+    Snakemake,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImportArgs {
+    /// The foreign file
+    pub(crate) file: PathBuf,
+    /// The model file; default: standard output
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace the model file if it is there
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 #[derive(Debug, Args)]

@@ -54,7 +54,7 @@ fn check_export(path: &Path, model: &Path) -> Result<(CheckReport, ModelFile), F
     let surface = Surface::new(arrays.vertices, arrays.faces, arrays.control_points);
     let surface =
         surface.map_err(|error| Failure::damaged(format!("{}: {error}", path.display())))?;
-    let tolerance = model.file.target.tolerance;
+    let tolerance = model.file.target.tolerance(surface.diagonal());
     let job = Job {
         surface: &surface,
         field: &model.field,

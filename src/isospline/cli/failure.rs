@@ -1,6 +1,7 @@
 //! Every error as the user sees it: message, place, help and exit code.
 
 use crate::cli::excerpt::Excerpt;
+use isospline::batch::BatchError;
 use isospline::config::{ConfigError, Place};
 use isospline::{FolderError, ModelError};
 use isospline_artifact::{Damage, StoreError};
@@ -51,7 +52,7 @@ const OTHER_SURFACE: u8 = 25;
 const BAD_BASE_MESH: u8 = 26;
 const OTHER_VERSION: u8 = 30;
 const DAMAGED: u8 = 31;
-const LOCKED: u8 = 32;
+pub(crate) const LOCKED: u8 = 32;
 const IO: u8 = 33;
 pub(crate) const BUG: u8 = 70;
 pub(crate) const STOPPED: u8 = 130;
@@ -164,6 +165,17 @@ impl From<StoreError> for Failure {
             _ => return Self::new(BUG, "bug", error.to_string()).helped(REPORT),
         };
         Self::new(exit, code, error.to_string()).helped(help)
+    }
+}
+
+impl From<BatchError> for Failure {
+    fn from(error: BatchError) -> Self {
+        let message = error.to_string();
+        match error {
+            BatchError::Source { .. } => Self::new(UNREADABLE, "unreadable", message),
+            BatchError::NoModels { .. } | BatchError::NoSuchModel { .. } => Self::usage(message),
+            BatchError::Store(error) => error.into(),
+        }
     }
 }
 

@@ -138,6 +138,9 @@ fn show(folder: &ModelFolder, report: &ConversionReport, json: bool) -> Result<(
     if let Some(topology) = report.topology {
         say(&format!("topology: {topology}"))?;
     }
+    if let Some(rounds) = &report.rounds {
+        say(&tables::rounds(rounds))?;
+    }
     say(&tables::check(&report.check, &folder.model().file))?;
     let path = folder.path().display();
     say(&format!(

@@ -1,8 +1,10 @@
 //! Tables for people: stage times and the figures of a check.
 
 use crate::cli::output::{duration, size};
+use isospline::Rounds;
 use isospline::config::ModelFile;
 use isospline::report::ConversionReport;
+use isospline::tolerance::Verdict;
 use isospline_check::{CheckParams, CheckReport, Expected};
 use std::fmt::Write as _;
 
@@ -19,6 +21,17 @@ pub(crate) fn stages(report: &ConversionReport) -> String {
     }
     write!(text, "{:<15}{:>10}", "whole run", duration(report.seconds)).expect(TEXT);
     text
+}
+
+/// How the faces for a tolerance were found.
+pub(crate) fn rounds(rounds: &Rounds) -> String {
+    let verdict = match rounds.verdict {
+        Verdict::Met => "just below the tolerance",
+        Verdict::FewestSound => "far below the tolerance, but fewer make no sound mesh, or miss it",
+        Verdict::Settled => "far below the tolerance, where the search was ended",
+        Verdict::NotReached => "the nearest found; the tolerance is not reached",
+    };
+    format!("faces:    {}, {verdict}; {} rounds", rounds.faces, rounds.rounds.len())
 }
 
 /// The figures of a check beside their limits, and the verdict.
@@ -43,7 +56,7 @@ const TEXT: &str = "invariant: a string takes all text";
 
 fn figures(report: &CheckReport, file: &ModelFile) -> Vec<(&'static str, String, String)> {
     let params: &CheckParams = &file.check;
-    let tolerance = file.target.tolerance;
+    let tolerance = file.target.tolerance(report.diagonal);
     let error_limit = params.error_limit(&Expected { tolerance, ..Expected::default() });
     let small = |x: f64| format!("{x:.2e}");
     let none = String::new;

@@ -107,6 +107,13 @@ impl Document {
         }
     }
 
+    /// Takes a value out, if it is there.
+    pub(crate) fn take(&mut self, table: &str, key: &str) {
+        if let Some(inner) = self.table.get_mut(table).and_then(toml::Value::as_table_mut) {
+            inner.remove(key);
+        }
+    }
+
     /// All values.
     pub fn table(&self) -> &toml::Table {
         &self.table

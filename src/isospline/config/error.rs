@@ -87,6 +87,16 @@ pub enum ConfigError {
         /// Dotted path.
         key: &'static str,
     },
+    /// Two keys that exclude each other.
+    #[error("`{key}` and `{other}` exclude each other{}", line_of(place.as_ref()))]
+    Conflict {
+        /// Dotted path.
+        key: String,
+        /// Dotted path of the other.
+        other: String,
+        /// Where the other stands.
+        place: Option<Place>,
+    },
     /// A key that is set in one place for several stages.
     #[error("`{key}` is not set here{}", line_of(place.as_ref()))]
     Elsewhere {
@@ -108,6 +118,7 @@ impl ConfigError {
             | Self::WrongType { place, .. }
             | Self::OutOfRange { place, .. }
             | Self::ParameterName { place, .. }
+            | Self::Conflict { place, .. }
             | Self::Elsewhere { place, .. } => place.as_ref(),
             Self::Read { .. } | Self::Override { .. } | Self::Missing { .. } => None,
         }
@@ -125,6 +136,7 @@ impl ConfigError {
             Self::OutOfRange { .. } => "out-of-range",
             Self::ParameterName { .. } => "parameter-name",
             Self::Missing { .. } => "missing-key",
+            Self::Conflict { .. } => "keys-conflict",
             Self::Elsewhere { .. } => "key-set-elsewhere",
         }
     }
@@ -150,6 +162,7 @@ impl ConfigError {
                 "rename the parameter, here and in the formula".to_owned()
             }
             Self::Missing { key } => format!("add `{key}` to the model file"),
+            Self::Conflict { key, other, .. } => format!("leave out `{key}` or `{other}`"),
             Self::Elsewhere { instead, .. } => format!("set `{instead}`: all stages take it"),
         }
     }

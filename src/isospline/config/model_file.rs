@@ -1,7 +1,8 @@
 //! The model file: what surface, how many faces, what passes, and the parameters of the stages.
 
 use crate::config::tables::{out_of_range, refuse_unknown_tables, typed};
-use crate::config::{ConfigError, Document, Fit, StageParams, foreign_as_toml};
+use crate::config::target::give_way;
+use crate::config::{ConfigError, Document, StageParams, TargetTable, foreign_as_toml};
 use isospline_check::CheckParams;
 use isospline_export::LengthUnit;
 use isospline_geometry::{Aabb, Vec3};
@@ -94,27 +95,6 @@ impl Default for ModelTable {
     }
 }
 
-/// Table `[target]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct TargetTable {
-    /// Faces of the base mesh, at most.
-    pub faces: u32,
-    /// Largest error that passes, relative to the diagonal of the bounding box.
-    pub tolerance: Option<f64>,
-    /// How the patches are fitted.
-    pub fit: Fit,
-}
-
-/// Faces where none are asked for: enough for a genus of about five, done in a blink.
-pub const DEFAULT_FACES: u32 = 2000;
-
-impl Default for TargetTable {
-    fn default() -> Self {
-        Self { faces: DEFAULT_FACES, tolerance: None, fit: Fit::default() }
-    }
-}
-
 /// A model file, read and checked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelFile {
@@ -145,6 +125,7 @@ impl ModelFile {
                 &foreign_as_toml(path, format, &text)?,
             )?,
         };
+        give_way(&mut doc, overrides);
         overrides.iter().try_for_each(|argument| doc.set(argument))?;
         let mut file = Self::from_document(&doc)?;
         if file.model.name.is_empty() {
@@ -178,31 +159,38 @@ impl ModelFile {
         known.extend(StageParams::NAMES);
         refuse_unknown_tables(doc, &known)?;
         let model: ModelTable = typed(doc, "model", &["base_mesh", "unit"])?;
-        let target: TargetTable = typed(doc, "target", &["tolerance"])?;
+        let target: TargetTable = typed(doc, "target", &["faces", "tolerance", "tolerance_abs"])?;
         let check: CheckParams = typed(doc, "check", &["error"])?;
         validate_model(doc, &model)?;
         validate_parameters(doc, &model)?;
-        validate_target(doc, &target)?;
+        target.validate(doc)?;
+        let target = target.completed();
         check
             .validate()
             .map_err(|(key, message)| out_of_range(doc, &format!("check.{key}"), message))?;
         let mut filled = doc.clone();
         target.fit.fill(&mut filled);
-        let stages = StageParams::read(&filled, target.faces)?;
+        let stages = StageParams::read(&filled, target.faces())?;
         Ok(Self { model, target, check, stages })
     }
 }
 
+/// The file's name without extension, as the name of a folder may be.
 fn name_of(path: &Path) -> String {
-    path.file_stem().map_or_else(|| "model".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    let stem = path.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy());
+    let stem = stem.trim_start_matches('.');
+    stem.chars().map(|c| if is_plain(c) { c } else { '_' }).collect()
+}
+
+fn is_plain(c: char) -> bool {
+    c.is_alphanumeric() || "-_.+".contains(c)
 }
 
 fn validate_model(doc: &Document, model: &ModelTable) -> Result<(), ConfigError> {
     if model.formula.trim().is_empty() {
         return Err(ConfigError::Missing { key: "model.formula" });
     }
-    let plain = |c: char| c.is_alphanumeric() || "-_.+".contains(c);
-    if !model.name.chars().all(plain) || model.name.starts_with('.') {
+    if !model.name.chars().all(is_plain) || model.name.starts_with('.') {
         let range = "letters, digits, `-`, `_`, `.` and `+`: it names a folder";
         return Err(out_of_range(doc, "model.name", range));
     }
@@ -242,18 +230,6 @@ fn validate_parameters(doc: &Document, model: &ModelTable) -> Result<(), ConfigE
         }
     }
     Ok(())
-}
-
-fn validate_target(doc: &Document, target: &TargetTable) -> Result<(), ConfigError> {
-    if target.faces < 4 {
-        return Err(out_of_range(doc, "target.faces", "at least 4, the faces of a tetrahedron"));
-    }
-    match target.tolerance {
-        Some(t) if !(t > 0.0 && t < 1.0) => {
-            Err(out_of_range(doc, "target.tolerance", "above 0 and below 1, of the box diagonal"))
-        }
-        _ => Ok(()),
-    }
 }
 
 impl Serialize for Domain {
@@ -302,6 +278,7 @@ impl<'de> Visitor<'de> for DomainVisitor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::DEFAULT_FACES;
 
     fn read(text: &str) -> Result<ModelFile, ConfigError> {
         ModelFile::from_document(&Document::parse("a.toml", text)?)
@@ -317,7 +294,7 @@ mod tests {
     fn a_formula_alone_is_a_model() {
         let file = read(SPHERE).unwrap();
         assert_eq!(file.model.domain, Domain::Auto);
-        assert_eq!(file.target.faces, DEFAULT_FACES);
+        assert_eq!(file.target.faces, Some(DEFAULT_FACES));
         assert_eq!(file.stages.decimate.faces, DEFAULT_FACES);
     }
 
@@ -392,7 +369,7 @@ mod tests {
     #[test]
     fn the_canonical_text_reads_back_as_an_equal_model() {
         let text = "name = \"a\"\nlevel = 0.1\nparameters = { a = 0.8 }\nunit = \"mm\"\n\
-            box = [[-1, 1], [-1, 1], [-2.5, 2]]\n[target]\nfaces = 100\ntolerance = 1e-5\n\
+            box = [[-1, 1], [-1, 1], [-2.5, 2]]\n[target]\ntolerance = 1e-5\n\
             [check]\nerror = 1e-7\n[decimate]\nspread = 0.25\n";
         let file = read(&format!("{SPHERE}{text}")).unwrap();
         assert_eq!(read(&file.to_toml()).unwrap(), file);
