@@ -12,7 +12,6 @@ use crate::driver::{Frame, Wanted};
 use crate::error::Kept;
 use crate::finisher::{Finished, Finisher};
 use crate::freshness::Source;
-use crate::keeper::Steps;
 use crate::prepare::{Assignment, Planned};
 use crate::workers::{Crew, Job, Notice};
 use crate::{Event, NodeReport, Provenance, RunError, clock, keeper, memory};
@@ -332,14 +331,6 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
         Ok(())
     }
 
-    /// Steps that are kept of a stage without tasks.
-    fn steps(&self, idx: usize) -> Option<(usize, usize)> {
-        let node = &self.frame.nodes[idx];
-        let stand = keeper::stand(self.frame.pipeline.store, &node.artifact).ok()??;
-        let (recipe, Steps { done, of }) = stand;
-        (recipe == node.recipe).then_some((done as usize, of as usize))
-    }
-
     /// Waits until all is stored; tells what is there, or what went wrong first.
     fn end(mut self) -> Result<Vec<Option<NodeReport>>, RunError> {
         // A store that fails is the cause of what follows from it.
@@ -358,11 +349,18 @@ impl<'scope, 'f> Dataflow<'scope, 'f> {
         }
         let stage = self.frame.label(unsettled.unwrap_or_default());
         let kept = (0..self.stands.len()).filter_map(|idx| {
-            let (done, of) = self.stands[idx].kept().or_else(|| self.steps(idx))?;
+            let (done, of) = self.stands[idx].kept().or_else(|| steps(self.frame, idx))?;
             Some(Kept { stage: self.frame.label(idx), done, of })
         });
         Err(RunError::Stopped { stage, kept: kept.collect() })
     }
+}
+
+/// Steps that are kept of a stage without tasks.
+fn steps(frame: &Frame<'_>, idx: usize) -> Option<(usize, usize)> {
+    let node = &frame.nodes[idx];
+    let (recipe, stand) = keeper::stand(frame.pipeline.store, &node.artifact).ok()??;
+    (recipe == node.recipe).then_some((stand.done as usize, stand.of as usize))
 }
 
 /// Removes what earlier runs left unfinished of artifacts that are whole now.

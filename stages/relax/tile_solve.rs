@@ -24,7 +24,7 @@ const RELIEF: f64 = 1.0 / 16.0;
 /// Factor after one that did not.
 const TIGHTENING: f64 = 10.0;
 /// Steps tried a visit; more than three never paid.
-const ATTEMPTS: u32 = 3;
+const ATTEMPTS: usize = 3;
 /// Weight of even nets against the normal distance while folds are mended.
 const UNFOLDING: f64 = 1e-2;
 /// Longest shift of a control point, times the mean side of its face.
@@ -101,8 +101,8 @@ impl Problem<'_> {
     fn unfolded(&self, visit: &Visit<'_>, damping: f64) -> Option<Outcome> {
         let here = &visit.here;
         let pulls = self.pulls(visit, &visit.interior, here);
-        for attempt in 0..ATTEMPTS {
-            let stiffer = damping * TIGHTENING.powi(attempt);
+        let stiffer = std::iter::successors(Some(damping), |d| Some(d * TIGHTENING));
+        for stiffer in stiffer.take(ATTEMPTS) {
             let Some(step) = self.step(visit, &pulls, stiffer) else { continue };
             let trial = step.applied(&visit.interior);
             let there = self.measure(&visit.faces, &trial);
