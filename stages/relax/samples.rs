@@ -17,7 +17,7 @@ const N_BOUNDARY: usize = N_CONTROL - N_INTERIOR;
 const FOLD_STRIDE: usize = 3;
 /// Steps a side between the places on the boundary that are tested: beside the long side of a
 /// sliver, folds do not reach the samples.
-const RIM_STEPS: usize = 6;
+const RIM_STEPS: usize = 12;
 
 /// Values at the samples, the inner points of a barycentric grid.
 #[derive(Clone, Debug)]
@@ -190,8 +190,8 @@ mod tests {
             assert!((p - Vec3::new(v, w, 0.0)).norm() < 1e-15);
         }
         let up = |n: usize, side: f64| vec![side * Vec3::z(); n];
-        let folded = |side| samples.folded(&net, &interior, &up(55, side), &up(15, side));
-        assert_eq!([folded(1.0), folded(-1.0)], [0, 19 + 15]);
+        let folded = |side| samples.folded(&net, &interior, &up(55, side), &up(33, side));
+        assert_eq!([folded(1.0), folded(-1.0)], [0, 19 + 33]);
     }
 
     #[test]
