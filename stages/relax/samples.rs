@@ -14,6 +14,8 @@ pub(crate) const LANES: usize = 4;
 const N_BOUNDARY: usize = N_CONTROL - N_INTERIOR;
 /// Every so many samples the patch is tested for folds: folds are wider than three samples.
 const FOLD_STRIDE: usize = 3;
+/// Cosine of the angle, 10 degrees, from which a patch may be folded between the samples.
+const TILT: f64 = 0.985;
 
 /// Values at the samples, the inner points of a barycentric grid.
 #[derive(Clone, Debug)]
@@ -64,23 +66,27 @@ impl Samples {
         }
     }
 
-    /// Samples whose patch normal points against `normal`.
+    /// Samples whose patch normal points against `normal`, and those where it stands off from it by
+    /// more than [`TILT`].
     pub(crate) fn folded(
         &self,
         net: &[Vec3; N_CONTROL],
         interior: &Interior,
         normal: &[Vec3],
-    ) -> usize {
+    ) -> [usize; 2] {
         let mut net = *net;
         for (&i, &p) in self.interior.iter().zip(interior) {
             net[i] = p;
         }
-        let is_folded = |(weights, outward): (&[[f64; N_CONTROL]; 2], &Vec3)| {
+        let mut counts = [0, 0];
+        for (weights, outward) in self.tangents.iter().zip(normal.iter().step_by(FOLD_STRIDE)) {
             let [a, b] = weights.each_ref().map(|row| combine(row, &net));
-            a.cross(&b).dot(outward) < 0.0
-        };
-        let outward = normal.iter().step_by(FOLD_STRIDE);
-        self.tangents.iter().zip(outward).filter(|pair| is_folded(*pair)).count()
+            let own = a.cross(&b);
+            let along = own.dot(outward);
+            counts[0] += usize::from(along < 0.0);
+            counts[1] += usize::from(along < TILT * own.norm());
+        }
+        counts
     }
 }
 
@@ -140,6 +146,6 @@ mod tests {
             assert!((p - Vec3::new(v, w, 0.0)).norm() < 1e-15);
         }
         let folded = |side: f64| samples.folded(&net, &interior, &vec![side * Vec3::z(); 55]);
-        assert_eq!([folded(1.0), folded(-1.0)], [0, 19]);
+        assert_eq!([folded(1.0), folded(-1.0)], [[0, 0], [19, 19]]);
     }
 }

@@ -64,7 +64,7 @@ impl Problem<'_> {
         let here = self.measure(&faces, &interior);
         let nu = vec![0.0; tile.edges.len()];
         let mut outcome = Outcome { interior: None, nu, damping, gain: 0.0 };
-        if here.unsound == 0 && here.largest() <= self.goal {
+        if here.unsound + here.tilted == 0 && here.largest() <= self.goal {
             return outcome;
         }
         for _ in 0..ATTEMPTS {
@@ -94,7 +94,10 @@ impl Problem<'_> {
         self.field.gradients(&points, &mut jets);
         let mut out = Measured::of(&jets);
         for (i, (face, inner)) in faces.iter().zip(interior).enumerate() {
-            out.unsound += self.samples.folded(&face.net, inner, &out.normal[i * n..(i + 1) * n]);
+            let normal = &out.normal[i * n..(i + 1) * n];
+            let [folded, tilted] = self.samples.folded(&face.net, inner, normal);
+            out.unsound += folded;
+            out.tilted += tilted;
         }
         out
     }
@@ -182,6 +185,8 @@ struct Measured {
     sum_sq: f64,
     /// Samples without a distance, and folds.
     unsound: usize,
+    /// Samples whose normal is far off.
+    tilted: usize,
 }
 
 impl Measured {
@@ -189,7 +194,7 @@ impl Measured {
     fn of(jets: &[Jet1]) -> Self {
         let n = jets.len();
         let (distance, normal) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let mut out = Self { distance, normal, sum_sq: 0.0, unsound: 0 };
+        let mut out = Self { distance, normal, sum_sq: 0.0, unsound: 0, tilted: 0 };
         for jet in jets {
             let slope = jet.gradient.norm();
             let distance = jet.value / slope;
