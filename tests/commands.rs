@@ -147,15 +147,33 @@ fn an_npz_export_has_the_figures_of_its_folder() {
 fn every_format_is_written_where_it_is_asked_for() {
     let sandbox = Sandbox::new();
     sandbox.converts("torus", &SMALL);
-    for format in ["vtu", "glb", "obj", "ply", "stl", "npz"] {
+    for format in ["step", "msh", "vtu", "3mf", "stl", "glb", "obj", "ply", "bv", "npz"] {
         sandbox.succeeds(&["export", "out", "--format", format]);
         let default = std::fs::read(sandbox.path(&format!("out/torus.{format}"))).unwrap();
         let file = format!("elsewhere.{format}");
-        sandbox.succeeds(&["export", "out", "--format", format, "-o", &file, "--samples", "8"]);
+        sandbox.succeeds(&["export", "out", "--format", format, "-o", &file, "--tolerance", "1e-4"]);
         assert!(std::fs::read(sandbox.path(&file)).unwrap() == default, "{format}");
     }
     let lost = sandbox.isospline(&["export", "out", "--format", "stl", "-o", "no/such/a.stl"]);
     assert_eq!(lost.code, 33, "{}", lost.stderr);
+    for (option, value, code) in [("--tolerance", "0", 2), ("--chord", "-1", 2), ("--order", "8", 2)] {
+        let option = format!("{option}={value}");
+        let refused = sandbox.isospline(&["export", "out", "--format", "stl", &option]);
+        assert_eq!(refused.code, code, "{option}: {}", refused.stderr);
+    }
+    lint_tells_a_sound_file_from_a_broken_one(&sandbox);
+}
+
+fn lint_tells_a_sound_file_from_a_broken_one(sandbox: &Sandbox) {
+    let sound = sandbox.succeeds(&["lint", "out/torus.step"]).stdout;
+    assert!(sound.contains("genus 1") && sound.contains("lint passed"), "{sound}");
+    let text = std::fs::read_to_string(sandbox.path("out/torus.step")).unwrap();
+    sandbox.write("broken.step", text.replacen(".T.);\n", ".F.);\n", 1));
+    let broken = sandbox.isospline(&["lint", "broken.step", "--json"]);
+    assert_eq!(broken.code, 1, "{}", broken.stderr);
+    let found: serde_json::Value = serde_json::from_str(&broken.stdout).unwrap();
+    assert_eq!(found["pass"], false);
+    assert!(!found["defects"].as_array().unwrap().is_empty());
 }
 
 #[test]
@@ -219,9 +237,40 @@ fn a_reader_that_goes_away_is_no_panic() {
 }
 
 #[test]
+fn completions_and_manual_pages_name_every_command() {
+    let sandbox = Sandbox::new();
+    let commands = ["run", "stage", "status", "inspect", "check", "export", "lint", "man", "schema"];
+    for shell in ["bash", "zsh", "fish"] {
+        let script = sandbox.succeeds(&["completions", shell]).stdout;
+        for word in commands.iter().chain(&["--tolerance", "--format"]) {
+            assert!(script.contains(word.trim_start_matches("--")), "{shell} lacks {word}");
+        }
+    }
+    let page = sandbox.succeeds(&["man"]).stdout;
+    assert!(page.contains(".TH isospline") && page.contains("the model file has a bad key"), "{page}");
+    let page = sandbox.succeeds(&["man", "export"]).stdout;
+    assert!(page.contains("isospline export") && page.contains("tolerance"), "{page}");
+    assert_eq!(sandbox.isospline(&["man", "nothing"]).code, 2);
+    std::fs::create_dir(sandbox.path("pages")).unwrap();
+    sandbox.succeeds(&["man", "--out", "pages"]);
+    for command in commands {
+        assert!(sandbox.path(&format!("pages/isospline-{command}.1")).is_file(), "{command}");
+    }
+}
+
+#[test]
+fn nothing_is_coloured_where_colour_is_not_wanted() {
+    let sandbox = Sandbox::new();
+    for args in [&["--help"][..], &["run", "nothing.toml"], &["export", "x", "--format", "zzz"]] {
+        let outcome = sandbox.isospline(args);
+        assert!(!outcome.stdout.contains('\u{1b}') && !outcome.stderr.contains('\u{1b}'), "{args:?}");
+    }
+}
+
+#[test]
 fn help_has_examples_and_the_exit_codes_of_the_readme() {
     let sandbox = Sandbox::new();
-    for command in ["run", "stage", "status", "inspect", "check", "export"] {
+    for command in ["run", "stage", "status", "inspect", "check", "export", "lint", "completions", "man", "schema"] {
         let help = sandbox.succeeds(&[command, "--help"]).stdout;
         assert!(help.contains(&format!("isospline {command} ")), "{help}");
         assert!(help.contains("Example"), "{help}");

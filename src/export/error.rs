@@ -25,6 +25,28 @@ pub enum ExportError {
         /// Most that are possible.
         max: u32,
     },
+    /// `order` is outside its range.
+    #[error("order = {order} is not in 1 ..= {max}")]
+    Order {
+        /// Order asked for.
+        order: u32,
+        /// Highest that there is.
+        max: u32,
+    },
+    /// A tolerance is no distance, or not below the size of the model.
+    #[error("a tolerance of {tolerance} is not above 0 and, as a part of the diagonal, below 1")]
+    ToleranceRange {
+        /// Tolerance asked for.
+        tolerance: f64,
+    },
+    /// A tolerance takes more triangles a patch than there may be.
+    #[error("patch {face} would need more than 65536 triangles for a tolerance of {tolerance:e}")]
+    Tolerance {
+        /// Tolerance asked for, model units.
+        tolerance: f64,
+        /// The patch.
+        face: usize,
+    },
     /// The format cannot count that far.
     #[error("{count} {what} are more than the {limit} that {format} can hold")]
     TooLarge {

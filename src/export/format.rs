@@ -1,7 +1,9 @@
 //! The formats, and the one function that writes them all.
 
-use crate::tessellation::Tessellation;
-use crate::{About, ExportError, StepOptions, glb, npz, obj, ply, step, stl, vtu};
+use crate::tessellation::{Density, Tessellation};
+use crate::{
+    About, ExportError, StepOptions, bezier_view, glb, msh, npz, obj, ply, step, stl, three_mf, vtu,
+};
 use isospline_artifact::kinds::PatchesView;
 use isospline_geometry::bezier_triangle::DEGREE;
 use std::fmt;
@@ -15,6 +17,10 @@ pub enum Format {
     Npz,
     /// VTK unstructured grid of degree-7 Bézier triangles. Exact.
     Vtu,
+    /// Gmsh 4.1 text: triangles of order 1 to 7 through points of the patches. Exact at order 7.
+    Msh,
+    /// `BezierView` text: degree-7 Bézier triangles. Exact.
+    Bv,
     /// ISO 10303 solids of polynomial patches. Exact.
     Step,
     /// Binary glTF: triangle mesh with normals and a material, f32.
@@ -25,14 +31,17 @@ pub enum Format {
     Ply,
     /// Binary STL: triangle soup whose shared corners agree in all bits, f32.
     Stl,
+    /// 3MF: triangle mesh with its unit, for printing, f32.
+    ThreeMf,
 }
 
 /// What may be chosen about an export.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Steps a side of each patch in triangle meshes, 1 ..= 256; default 8. Exact formats ignore
-    /// it.
-    pub samples: u32,
+    /// How fine triangle meshes are. Exact formats and msh ignore it.
+    pub density: Density,
+    /// Order of the triangles in msh, 1 ..= 7; default 7.
+    pub order: u32,
     /// Name, unit and origin, for the formats that have a place for them.
     pub about: About,
     /// Of STEP files.
@@ -41,7 +50,7 @@ pub struct Options {
 
 /// No format has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown format {name:?}; formats are npz, vtu, step, glb, obj, ply, stl")]
+#[error("unknown format {name:?}; formats are npz, vtu, msh, bv, step, glb, obj, ply, stl, 3mf")]
 pub struct UnknownFormat {
     /// The name given.
     pub name: String,
@@ -59,15 +68,18 @@ pub fn write(
 ) -> Result<(), ExportError> {
     require_coherent(patches)?;
     let mut out = BufWriter::with_capacity(1 << 16, out);
-    let sampled = || Tessellation::new(patches, options.samples);
+    let sampled = || Tessellation::new(patches, options.density);
     match format {
         Format::Npz => npz::write(patches, &mut out)?,
         Format::Vtu => vtu::write(patches, &mut out)?,
+        Format::Msh => msh::write(patches, options.order, &mut out)?,
+        Format::Bv => bezier_view::write(patches, &options.about, &mut out)?,
         Format::Step => step::write(patches, options, &mut out)?,
         Format::Glb => glb::write(&sampled()?, &mut out)?,
         Format::Obj => obj::write(&sampled()?, &mut out)?,
         Format::Ply => ply::write(&sampled()?, &mut out)?,
         Format::Stl => stl::write(&sampled()?, &mut out)?,
+        Format::ThreeMf => three_mf::write(&sampled()?, &options.about, &mut out)?,
     }
     out.flush()?;
     Ok(())
@@ -75,19 +87,32 @@ pub fn write(
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 7] =
-        [Self::Npz, Self::Vtu, Self::Step, Self::Glb, Self::Obj, Self::Ply, Self::Stl];
+    pub const ALL: [Self; 10] = [
+        Self::Npz,
+        Self::Vtu,
+        Self::Msh,
+        Self::Bv,
+        Self::Step,
+        Self::Glb,
+        Self::Obj,
+        Self::Ply,
+        Self::Stl,
+        Self::ThreeMf,
+    ];
 
     /// Name, which is also the file extension.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Npz => "npz",
             Self::Vtu => "vtu",
+            Self::Msh => "msh",
+            Self::Bv => "bv",
             Self::Step => "step",
             Self::Glb => "glb",
             Self::Obj => "obj",
             Self::Ply => "ply",
             Self::Stl => "stl",
+            Self::ThreeMf => "3mf",
         }
     }
 
@@ -113,7 +138,8 @@ impl fmt::Display for Format {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 8, about: About::default(), step: StepOptions::default() }
+        let (density, step) = (Density::default(), StepOptions::default());
+        Self { density, order: 7, about: About::default(), step }
     }
 }
 
@@ -149,8 +175,13 @@ mod tests {
     fn bytes(format: Format) -> Vec<u8> {
         let patches = sample::ball_and_ring();
         let mut out = Vec::new();
-        write(format, &patches.view(), &Options { samples: 3, ..Options::default() }, &mut out)
-            .unwrap();
+        write(
+            format,
+            &patches.view(),
+            &Options { density: Density::Samples(3), ..Options::default() },
+            &mut out,
+        )
+        .unwrap();
         out
     }
 
@@ -191,7 +222,7 @@ mod tests {
                 let done = write(
                     format,
                     &patches.view(),
-                    &Options { samples: 3, ..Options::default() },
+                    &Options { density: Density::Samples(3), ..Options::default() },
                     &mut Full(space),
                 );
                 let refused = done.unwrap_err();
@@ -223,7 +254,7 @@ mod tests {
             let done = write(
                 Format::Stl,
                 &patches.view(),
-                &Options { samples, ..Options::default() },
+                &Options { density: Density::Samples(samples), ..Options::default() },
                 &mut Vec::new(),
             );
             assert!(done.unwrap_err().to_string().contains("samples"));

@@ -105,12 +105,13 @@ fn bounds_f32(mesh: &Tessellation<'_>) -> Result<([f32; 3], [f32; 3]), ExportErr
 mod tests {
     use super::*;
     use crate::sample;
+    use crate::tessellation::Density;
 
     #[test]
     fn lengths_bounds_and_material_are_as_the_format_wants_them() {
         let patches = sample::ball_and_ring();
         let view = patches.view();
-        let mesh = Tessellation::new(&view, 3).unwrap();
+        let mesh = Tessellation::new(&view, Density::Samples(3)).unwrap();
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();
         let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;

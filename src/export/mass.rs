@@ -119,7 +119,7 @@ fn combine(weights: &[f64], points: &[Vec3]) -> Vec3 {
 }
 
 /// Nodes and weights of Gauss and Legendre on [0, 1], by Newton's method.
-fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     let count = n as f64;
     let node = |k: usize| {
         let mut x = libm::cos(std::f64::consts::PI * (k as f64 + 0.75) / (count + 0.5));

@@ -42,7 +42,7 @@ pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<()
         ("control_points.npy", control_points),
         ("degree.npy", degree),
     ];
-    zip_archive::write(&entries, out)
+    zip_archive::write("npz", &entries, out)
 }
 
 fn write_floats<'a>(out: &mut dyn Write, values: impl Iterator<Item = &'a f64>) -> io::Result<()> {

@@ -29,12 +29,13 @@ fn row(out: &mut dyn Write, tag: &str, p: &Vec3) -> io::Result<()> {
 mod tests {
     use super::*;
     use crate::sample;
+    use crate::tessellation::Density;
 
     #[test]
     fn every_coordinate_reads_back_to_the_same_bits() {
         let patches = sample::ball_and_ring();
         let view = patches.view();
-        let mesh = Tessellation::new(&view, 3).unwrap();
+        let mesh = Tessellation::new(&view, Density::Samples(3)).unwrap();
         let mut text = Vec::new();
         write(&mesh, &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();

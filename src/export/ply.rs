@@ -39,12 +39,13 @@ pub(crate) fn write(mesh: &Tessellation<'_>, out: &mut dyn Write) -> Result<(), 
 mod tests {
     use super::*;
     use crate::sample;
+    use crate::tessellation::Density;
 
     #[test]
     fn the_header_counts_what_follows() {
         let patches = sample::ball_and_ring();
         let view = patches.view();
-        let mesh = Tessellation::new(&view, 3).unwrap();
+        let mesh = Tessellation::new(&view, Density::Samples(3)).unwrap();
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();
         let end = b"end_header\n";

@@ -44,9 +44,18 @@ pub(crate) fn hollow_ball_and_ring() -> Patches {
 
 const EDGE: &str = "invariant: a closed mesh has both directions of an edge";
 
+/// Eight flat patches: the octahedron itself, its control points where degree elevation puts them.
+pub(crate) fn flat_octahedron() -> Patches {
+    patches_over(&octahedron(), |p| p)
+}
+
 /// Patches over the faces of a mesh whose control points all go through one polynomial map, so
 /// that no two agree by accident.
 fn bulged(mesh: &TriangleMesh) -> Patches {
+    patches_over(mesh, bulge)
+}
+
+fn patches_over(mesh: &TriangleMesh, bulge: fn(Vec3) -> Vec3) -> Patches {
     let mut edges: Vec<[u32; 2]> = mesh
         .faces
         .iter()

@@ -33,13 +33,14 @@ fn write_f32(out: &mut dyn Write, v: &Vec3) -> io::Result<()> {
 mod tests {
     use super::*;
     use crate::sample;
+    use crate::tessellation::Density;
     use std::collections::BTreeMap;
 
     #[test]
     fn every_directed_edge_has_its_reverse_in_all_bits() {
         let patches = sample::ball_and_ring();
         let view = patches.view();
-        let mesh = Tessellation::new(&view, 4).unwrap();
+        let mesh = Tessellation::new(&view, Density::Samples(4)).unwrap();
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();
         let triangles = bytes[84..].as_chunks::<50>().0;

@@ -1,20 +1,41 @@
 //! A triangle mesh sampled from the patches, closed by construction.
 //!
-//! Points are numbered by what they lie on: the vertices, then `n - 1` points an edge from its
+//! Every edge is cut into some number of segments, every face is tiled to fit its three edges
+//! ([`tiling`]); how many is either the same everywhere or follows from a tolerance ([`plan`]).
+//! Points are numbered by what they lie on: the vertices, then those inside each edge from its
 //! lower to its higher vertex, then the inner points of each face in storage order. A point on an
 //! edge is evaluated from the edge's own curve, so every face that names it gets the same bits.
 
+mod piece;
+mod plan;
+mod tiling;
+
 use crate::ExportError;
 use isospline_artifact::kinds::PatchesView;
-use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, bernstein, boundary_index, exponents, index, n_control,
-};
+use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index};
 use isospline_geometry::{Vec3, bezier_curve};
+use piece::reduced_to_plane;
+use plan::Plan;
+use tiling::{Place, Tiling};
 
-/// Most steps a side: 65 536 triangles a patch.
-const MAX_SAMPLES: u32 = 256;
-/// No half-edge.
-const NONE: u32 = u32::MAX;
+/// How finely patches are cut into triangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Density {
+    /// As many segments along every edge, 1 ..= 256; the square of it triangles a patch.
+    Samples(u32),
+    /// No point of a patch is farther from the triangles than this part of the diagonal of the
+    /// box around the vertices; above 0, below 1.
+    Relative(f64),
+    /// The same as a length in model units, above 0.
+    Length(f64),
+}
+
+impl Default for Density {
+    /// A ten-thousandth of the diagonal: no facet of a model that fills the screen shows.
+    fn default() -> Self {
+        Self::Relative(1e-4)
+    }
+}
 
 /// A point of the mesh.
 #[derive(Clone, Copy, Debug)]
@@ -27,24 +48,23 @@ pub(crate) struct Sample {
 #[derive(Debug)]
 pub(crate) struct Tessellation<'a> {
     patches: &'a PatchesView<'a>,
-    /// Steps a side.
-    n: usize,
+    plan: Plan,
     /// One half-edge that leaves each vertex.
     half_of_vertex: Vec<u32>,
     /// One half-edge along each edge.
     half_of_edge: Vec<u32>,
-    /// Linear forms of each grid point, in storage order.
-    stencils: Vec<Stencil>,
-    /// What each grid point lies on, in storage order.
-    places: Vec<Place>,
+    /// Number of the first point inside each edge, then that of the first in no edge.
+    first_on_edge: Vec<u32>,
+    /// Number of the first inner point of each face, then the number of all points.
+    first_in_face: Vec<u32>,
+    n_triangles: u64,
 }
 
+/// No half-edge.
+const NONE: u32 = u32::MAX;
+
 impl<'a> Tessellation<'a> {
-    pub(crate) fn new(patches: &'a PatchesView<'a>, samples: u32) -> Result<Self, ExportError> {
-        if !(1..=MAX_SAMPLES).contains(&samples) {
-            return Err(ExportError::Samples { samples, max: MAX_SAMPLES });
-        }
-        let n = samples as usize;
+    pub(crate) fn new(patches: &'a PatchesView<'a>, density: Density) -> Result<Self, ExportError> {
         let mut half_of_vertex = vec![NONE; patches.position.len()];
         let mut half_of_edge = vec![NONE; patches.boundary.len()];
         for (h, (&v, &e)) in
@@ -55,21 +75,28 @@ impl<'a> Tessellation<'a> {
         }
         require_all_used("vertex", &half_of_vertex)?;
         require_all_used("edge", &half_of_edge)?;
-        let stencils = exponents(n).map(|e| Stencil::new(e.map(|x| x as f64 / n as f64))).collect();
-        let places = places(n);
-        let mesh = Self { patches, n, half_of_vertex, half_of_edge, stencils, places };
-        mesh.require_countable()?;
-        Ok(mesh)
+        let plan = Plan::new(patches, &half_of_edge, density)?;
+        let [first_on_edge, first_in_face] = numbering(patches, &plan)?;
+        let n_triangles = (0..patches.face.len()).map(|f| plan.shape(patches, f).n_triangles());
+        let n_triangles = n_triangles.map(|n| n as u64).sum();
+        require_countable("triangles", n_triangles)?;
+        Ok(Self {
+            patches,
+            plan,
+            half_of_vertex,
+            half_of_edge,
+            first_on_edge,
+            first_in_face,
+            n_triangles,
+        })
     }
 
     pub(crate) fn n_points(&self) -> u64 {
-        let (v, e) = (self.patches.position.len(), self.patches.boundary.len());
-        let inner = self.patches.face.len() * self.inner_a_face();
-        (v + e * (self.n - 1) + inner) as u64
+        u64::from(*self.first_in_face.last().expect("invariant: numbers end with their count"))
     }
 
     pub(crate) fn n_triangles(&self) -> u64 {
-        (self.patches.face.len() * self.n * self.n) as u64
+        self.n_triangles
     }
 
     pub(crate) fn n_faces(&self) -> usize {
@@ -81,151 +108,170 @@ impl<'a> Tessellation<'a> {
         &self,
         mut take: impl FnMut(Sample) -> Result<(), E>,
     ) -> Result<(), E> {
-        for (v, &h) in self.half_of_vertex.iter().enumerate() {
-            let (f, corner) = (h as usize / 3, h as usize % 3);
-            let stencil = &self.stencils[boundary_index(self.n, corner, 0)];
-            let (_, normal) = stencil.evaluate(&self.patches.net(f));
-            take(Sample { position: Vec3::from(self.patches.position[v]), normal })?;
+        (0..self.half_of_vertex.len()).try_for_each(|v| take(self.at_vertex(v)))?;
+        for e in 0..self.half_of_edge.len() {
+            self.on_edge(e).try_for_each(&mut take)?;
         }
-        for (e, &h) in self.half_of_edge.iter().enumerate() {
-            let (f, corner) = (h as usize / 3, h as usize % 3);
-            let net = self.patches.net(f);
-            for step in 1..self.n {
-                let at = boundary_index(self.n, corner, self.along(f, corner, step));
-                let (_, normal) = self.stencils[at].evaluate(&net);
-                take(Sample { position: self.on_edge(e, h, step), normal })?;
-            }
-        }
-        for f in 0..self.patches.face.len() {
-            let net = self.patches.net(f);
-            for (place, stencil) in self.places.iter().zip(&self.stencils) {
-                if let Place::Inner(_) = place {
-                    let (position, normal) = stencil.evaluate(&net);
-                    take(Sample { position, normal })?;
-                }
-            }
-        }
-        Ok(())
+        (0..self.n_faces()).try_for_each(|f| self.in_face(f).try_for_each(&mut take))
+    }
+
+    /// The point at a vertex.
+    pub(crate) fn at_vertex(&self, v: usize) -> Sample {
+        let (f, corner) = split(self.half_of_vertex[v]);
+        let mut at = [0.0; 3];
+        at[corner] = 1.0;
+        let (_, normal) = evaluate(&self.patches.net(f), at);
+        Sample { position: Vec3::from(self.patches.position[v]), normal }
+    }
+
+    /// The points inside an edge, from its lower vertex on.
+    pub(crate) fn on_edge(&self, e: usize) -> impl Iterator<Item = Sample> {
+        let (f, corner) = split(self.half_of_edge[e]);
+        let (net, curve) = (self.patches.net(f), edge_curve(self.patches, f, corner));
+        let n = self.plan.segments(e);
+        let is_up = runs_up(self.patches, f, corner);
+        (1..n).map(move |step| {
+            let t = step as f64 / n as f64;
+            let along = if is_up { t } else { 1.0 - t };
+            let mut at = [0.0; 3];
+            at[corner] = 1.0 - along;
+            at[(corner + 1) % 3] = along;
+            let (_, normal) = evaluate(&net, at);
+            Sample { position: bezier_curve::evaluate(&curve, t), normal }
+        })
+    }
+
+    /// The inner points of a face, in storage order.
+    pub(crate) fn in_face(&self, f: usize) -> impl Iterator<Item = Sample> {
+        let net = self.patches.net(f);
+        self.plan.shape(self.patches, f).inner().map(move |at| {
+            let (position, normal) = evaluate(&net, at);
+            Sample { position, normal }
+        })
+    }
+
+    /// Numbers of the points inside an edge, from its lower vertex on.
+    pub(crate) fn numbers_on_edge(&self, e: usize) -> std::ops::Range<u32> {
+        self.first_on_edge[e]..self.first_on_edge[e + 1]
+    }
+
+    /// Numbers of the inner points of a face.
+    pub(crate) fn numbers_in_face(&self, f: usize) -> std::ops::Range<u32> {
+        self.first_in_face[f]..self.first_in_face[f + 1]
     }
 
     /// Numbers of the corners of the triangles of face `f`, counter-clockwise from outside.
     pub(crate) fn triangles(&self, f: usize) -> impl Iterator<Item = [u32; 3]> {
-        let ids: Vec<u32> = self.places.iter().map(|&place| self.number(f, place)).collect();
-        grid_triangles(self.n).map(move |t| t.map(|q| ids[q]))
+        let Tiling { places, triangles } = self.plan.shape(self.patches, f).tiling();
+        let ids: Vec<u32> = places.iter().map(|&place| self.number(f, place)).collect();
+        triangles.into_iter().map(move |t| t.map(|q| ids[q as usize]))
     }
 
     /// Positions of the corners of the triangles of face `f`; the same bits as the points that
     /// [`Self::triangles`] numbers.
     pub(crate) fn triangle_positions(&self, f: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        let shape = self.plan.shape(self.patches, f);
+        let Tiling { places, triangles } = shape.tiling();
         let net = self.patches.net(f);
-        let points: Vec<Vec3> = self
-            .places
-            .iter()
-            .zip(&self.stencils)
-            .map(|(&place, stencil)| match place {
-                Place::Corner(corner) => self.corner(f, corner),
-                Place::Edge { corner, step } => {
-                    let half = 3 * f + corner;
-                    let edge = self.patches.edge_of[half] as usize;
-                    self.on_edge(edge, half as u32, self.along(f, corner, step))
-                }
-                Place::Inner(_) => stencil.evaluate(&net).0,
-            })
-            .collect();
-        grid_triangles(self.n).map(move |t| t.map(|q| points[q]))
-    }
-
-    fn require_countable(&self) -> Result<(), ExportError> {
-        // PLY and many readers count in i32; the other formats get the same limit.
-        let limit = i32::MAX as u64;
-        for (what, count) in [("points", self.n_points()), ("triangles", self.n_triangles())] {
-            if count > limit {
-                return Err(ExportError::TooLarge {
-                    format: "a triangle mesh",
-                    what,
-                    count,
-                    limit,
-                });
+        let curves = [0, 1, 2].map(|corner| edge_curve(self.patches, f, corner));
+        let position = |place: &Place| match *place {
+            Place::Corner(corner) => corner_point(self.patches, f, corner),
+            Place::Edge { corner, step } => {
+                let n = shape.segments[corner];
+                let step = self.from_lower(f, corner, step);
+                bezier_curve::evaluate(&curves[corner], step as f64 / n as f64)
             }
-        }
-        Ok(())
+            Place::Inner { .. } => evaluate(&net, shape.at(*place)).0,
+        };
+        let points: Vec<Vec3> = places.iter().map(position).collect();
+        triangles.into_iter().map(move |t| t.map(|q| points[q as usize]))
     }
 
-    fn inner_a_face(&self) -> usize {
-        if self.n < 3 { 0 } else { n_control(self.n - 3) }
+    /// Numbers of all points of a face in storage order of a net of degree `n`, where all its
+    /// edges have `n` segments.
+    pub(crate) fn grid_numbers(&self, f: usize) -> Vec<u32> {
+        let places = self.plan.shape(self.patches, f).grid_places();
+        places.map(|place| self.number(f, place)).collect()
     }
 
     fn number(&self, f: usize, place: Place) -> u32 {
-        let (v, e) = (self.patches.position.len(), self.patches.boundary.len());
-        let a_side = self.n - 1;
-        let number = match place {
-            Place::Corner(corner) => return self.patches.face[f][corner],
+        match place {
+            Place::Corner(corner) => self.patches.face[f][corner],
             Place::Edge { corner, step } => {
                 let edge = self.patches.edge_of[3 * f + corner] as usize;
-                v + edge * a_side + self.along(f, corner, step) - 1
+                self.first_on_edge[edge] + self.from_lower(f, corner, step) as u32 - 1
             }
-            Place::Inner(slot) => v + e * a_side + f * self.inner_a_face() + slot,
-        };
-        number as u32
+            Place::Inner { slot, .. } => self.first_in_face[f] + slot as u32,
+        }
     }
 
     /// Turns steps from `corner` into steps from the lower vertex of its edge, and back.
-    fn along(&self, f: usize, corner: usize, step: usize) -> usize {
-        let face = self.patches.face[f];
-        if face[corner] < face[(corner + 1) % 3] { step } else { self.n - step }
-    }
-
-    fn corner(&self, f: usize, corner: usize) -> Vec3 {
-        Vec3::from(self.patches.position[self.patches.face[f][corner] as usize])
-    }
-
-    /// Point `step` of edge `e`, counted from its lower vertex; `half` is a half-edge along it.
-    fn on_edge(&self, e: usize, half: u32, step: usize) -> Vec3 {
-        let (f, corner) = (half as usize / 3, half as usize % 3);
-        let mut ends = [self.corner(f, corner), self.corner(f, (corner + 1) % 3)];
-        if self.along(f, corner, 0) != 0 {
-            ends.reverse();
+    fn from_lower(&self, f: usize, corner: usize, step: usize) -> usize {
+        if runs_up(self.patches, f, corner) {
+            return step;
         }
-        let inner = &self.patches.boundary[e];
-        let at = |k: usize| Vec3::new(inner[3 * k], inner[3 * k + 1], inner[3 * k + 2]);
-        let curve = [ends[0], at(0), at(1), at(2), ends[1]];
-        bezier_curve::evaluate(&curve, step as f64 / self.n as f64)
+        self.plan.segments(self.patches.edge_of[3 * f + corner] as usize) - step
     }
 }
 
-/// What a grid point of a face lies on; steps are counted from the corner.
-#[derive(Clone, Copy, Debug)]
-enum Place {
-    Corner(usize),
-    Edge { corner: usize, step: usize },
-    Inner(usize),
+fn split(half: u32) -> (usize, usize) {
+    (half as usize / 3, half as usize % 3)
 }
 
-fn places(n: usize) -> Vec<Place> {
-    let mut n_inner = 0;
-    exponents(n)
-        .map(|e| {
-            if let Some(corner) = (0..3).find(|&c| e[c] == n) {
-                return Place::Corner(corner);
-            }
-            if let Some(opposite) = (0..3).find(|&c| e[c] == 0) {
-                let corner = (opposite + 1) % 3;
-                return Place::Edge { corner, step: e[(corner + 1) % 3] };
-            }
-            n_inner += 1;
-            Place::Inner(n_inner - 1)
-        })
-        .collect()
+fn runs_up(patches: &PatchesView<'_>, f: usize, corner: usize) -> bool {
+    let face = patches.face[f];
+    face[corner] < face[(corner + 1) % 3]
 }
 
-/// Grid indices of the `n^2` small triangles: those that point as the patch does, then the others.
-fn grid_triangles(n: usize) -> impl Iterator<Item = [usize; 3]> {
-    let upright = exponents(n - 1)
-        .map(|[i, j, k]| [index([i + 1, j, k]), index([i, j + 1, k]), index([i, j, k + 1])]);
-    let inverted = (n > 1).then(|| exponents(n - 2)).into_iter().flatten().map(|[i, j, k]| {
-        [index([i + 1, j + 1, k]), index([i, j + 1, k + 1]), index([i + 1, j, k + 1])]
-    });
-    upright.chain(inverted)
+fn corner_point(patches: &PatchesView<'_>, f: usize, corner: usize) -> Vec3 {
+    Vec3::from(patches.position[patches.face[f][corner] as usize])
+}
+
+/// The curve of an edge of a face, from its lower vertex on.
+fn edge_curve(patches: &PatchesView<'_>, f: usize, corner: usize) -> [Vec3; 5] {
+    let mut ends = [corner_point(patches, f, corner), corner_point(patches, f, (corner + 1) % 3)];
+    if !runs_up(patches, f, corner) {
+        ends.reverse();
+    }
+    let inner = &patches.boundary[patches.edge_of[3 * f + corner] as usize];
+    let at = |k: usize| Vec3::new(inner[3 * k], inner[3 * k + 1], inner[3 * k + 2]);
+    [ends[0], at(0), at(1), at(2), ends[1]]
+}
+
+/// Point and unit normal of a patch; the normal of the flat triangle where the patch has none.
+fn evaluate(net: &[Vec3; N_CONTROL], at: [f64; 3]) -> (Vec3, Vec3) {
+    let [a, b, c] = reduced_to_plane(net, at);
+    let point = at[0] * a + at[1] * b + at[2] * c;
+    let unit = |normal: Vec3| normal.try_normalize(0.0);
+    let chords = [1, 2].map(|corner| net[boundary_index(DEGREE, corner, 0)] - net[0]);
+    let normal = unit((b - a).cross(&(c - a))).or_else(|| unit(chords[0].cross(&chords[1])));
+    (point, normal.unwrap_or_else(Vec3::z))
+}
+
+/// First numbers of the points on edges and in faces, each list with the end of its last.
+fn numbering(patches: &PatchesView<'_>, plan: &Plan) -> Result<[Vec<u32>; 2], ExportError> {
+    let mut next = patches.position.len() as u64;
+    let mut take = |counts: &mut dyn Iterator<Item = usize>| {
+        let mut first = vec![next as u32];
+        for count in counts {
+            next += count as u64;
+            first.push(next as u32);
+        }
+        require_countable("points", next).map(|()| first)
+    };
+    let on_edges = take(&mut (0..patches.boundary.len()).map(|e| plan.segments(e) - 1))?;
+    let inner = |f| plan.shape(patches, f).n_inner();
+    let in_faces = take(&mut (0..patches.face.len()).map(inner))?;
+    Ok([on_edges, in_faces])
+}
+
+/// PLY and many readers count in i32; the other formats get the same limit.
+fn require_countable(what: &'static str, count: u64) -> Result<(), ExportError> {
+    let limit = i32::MAX as u64;
+    if count > limit {
+        return Err(ExportError::TooLarge { format: "a triangle mesh", what, count, limit });
+    }
+    Ok(())
 }
 
 fn require_all_used(what: &'static str, half_of: &[u32]) -> Result<(), ExportError> {
@@ -235,51 +281,22 @@ fn require_all_used(what: &'static str, half_of: &[u32]) -> Result<(), ExportErr
     }
 }
 
-/// Linear forms that give point and derivatives at one barycentric point from the net.
-#[derive(Debug)]
-struct Stencil {
-    point: [f64; N_CONTROL],
-    /// Derivative from corner 0 towards corner 1, without the factor 7.
-    along: [f64; N_CONTROL],
-    /// Derivative from corner 0 towards corner 2, without the factor 7.
-    across: [f64; N_CONTROL],
-}
-
-impl Stencil {
-    fn new(at: [f64; 3]) -> Self {
-        let mut out =
-            Self { point: [0.0; N_CONTROL], along: [0.0; N_CONTROL], across: [0.0; N_CONTROL] };
-        out.point.copy_from_slice(&bernstein(DEGREE, at));
-        for ([i, j, k], weight) in exponents(DEGREE - 1).zip(bernstein(DEGREE - 1, at)) {
-            let [pu, pv, pw] = [index([i + 1, j, k]), index([i, j + 1, k]), index([i, j, k + 1])];
-            out.along[pv] += weight;
-            out.along[pu] -= weight;
-            out.across[pw] += weight;
-            out.across[pu] -= weight;
-        }
-        out
-    }
-
-    /// Point and unit normal; the normal of the flat triangle where the patch has none.
-    fn evaluate(&self, net: &[Vec3; N_CONTROL]) -> (Vec3, Vec3) {
-        let (mut point, mut along, mut across) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
-        for (s, p) in net.iter().enumerate() {
-            point += self.point[s] * p;
-            along += self.along[s] * p;
-            across += self.across[s] * p;
-        }
-        let unit = |normal: Vec3| normal.try_normalize(0.0);
-        let chords = [1, 2].map(|corner| net[boundary_index(DEGREE, corner, 0)] - net[0]);
-        let normal = unit(along.cross(&across)).or_else(|| unit(chords[0].cross(&chords[1])));
-        (point, normal.unwrap_or_else(Vec3::z))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::sample;
     use isospline_geometry::TriangleMesh;
+
+    const DENSITIES: [Density; 8] = [
+        Density::Samples(1),
+        Density::Samples(2),
+        Density::Samples(3),
+        Density::Samples(7),
+        Density::Relative(0.02),
+        Density::Relative(2e-3),
+        Density::Relative(2e-4),
+        Density::Length(1e-3),
+    ];
 
     fn mesh(tessellation: &Tessellation<'_>) -> TriangleMesh {
         let mut mesh = TriangleMesh::default();
@@ -295,15 +312,15 @@ mod tests {
     #[test]
     fn the_mesh_is_closed_and_keeps_the_topology_at_every_density() {
         let patches = sample::ball_and_ring();
-        for samples in [1, 2, 3, 4, 7] {
+        for density in DENSITIES {
             let view = patches.view();
-            let tessellation = Tessellation::new(&view, samples).unwrap();
+            let tessellation = Tessellation::new(&view, density).unwrap();
             let mesh = mesh(&tessellation);
             let opposite = mesh.opposites().unwrap();
             mesh.check_fans(&opposite).unwrap();
             assert!(!opposite.contains(&isospline_geometry::triangle_mesh::BORDER));
             // A sphere and a torus.
-            assert_eq!(mesh.euler_characteristic(&opposite), 2, "{samples} samples");
+            assert_eq!(mesh.euler_characteristic(&opposite), 2, "{density:?}");
             assert_eq!(mesh.faces.len() as u64, tessellation.n_triangles());
             assert_eq!(mesh.positions.len() as u64, tessellation.n_points());
         }
@@ -313,32 +330,25 @@ mod tests {
     fn positions_of_triangles_are_those_of_the_points_in_all_bits() {
         let patches = sample::ball_and_ring();
         let view = patches.view();
-        let tessellation = Tessellation::new(&view, 5).unwrap();
-        let mesh = mesh(&tessellation);
-        for f in 0..tessellation.n_faces() {
-            let by_number =
-                tessellation.triangles(f).map(|t| t.map(|v| mesh.positions[v as usize]));
-            assert!(by_number.eq(tessellation.triangle_positions(f)));
+        for density in DENSITIES {
+            let tessellation = Tessellation::new(&view, density).unwrap();
+            let mesh = mesh(&tessellation);
+            for f in 0..tessellation.n_faces() {
+                let by_number =
+                    tessellation.triangles(f).map(|t| t.map(|v| mesh.positions[v as usize]));
+                assert!(by_number.eq(tessellation.triangle_positions(f)), "{density:?}");
+            }
         }
     }
 
     #[test]
-    fn points_lie_on_their_patches() {
+    fn inner_points_lie_on_their_patches() {
         let patches = sample::ball_and_ring();
         let view = patches.view();
-        let n = 6;
-        let tessellation = Tessellation::new(&view, n as u32).unwrap();
-        for f in 0..tessellation.n_faces() {
-            let corners: Vec<[Vec3; 3]> = tessellation.triangle_positions(f).collect();
-            for (t, triangle) in grid_triangles(n).zip(corners) {
-                for (q, p) in t.into_iter().zip(triangle) {
-                    let e = exponents(n).nth(q).unwrap();
-                    let at = e.map(|x| x as f64 / n as f64);
-                    let net = view.net(f);
-                    let exact = isospline_geometry::bezier_triangle::evaluate(7, &net, at);
-                    assert!((p - exact).norm() < 1e-14);
-                }
-            }
+        for (at, f) in [([0.25, 0.5, 0.25], 0), ([0.1, 0.2, 0.7], 30), ([0.0, 0.4, 0.6], 60)] {
+            let net = view.net(f);
+            let exact = isospline_geometry::bezier_triangle::evaluate(DEGREE, &net, at);
+            assert!((evaluate(&net, at).0 - exact).norm() < 1e-14);
         }
     }
 
@@ -348,11 +358,11 @@ mod tests {
         let view = patches.view();
         let net = view.net(0);
         let at = [0.25, 0.5, 0.25];
-        let (point, normal) = Stencil::new(at).evaluate(&net);
+        let (point, normal) = evaluate(&net, at);
         let h = 1e-5;
         for step in [[-h, h, 0.0], [-h, 0.0, h]] {
             let moved = std::array::from_fn(|c| at[c] + step[c]);
-            let slope = (Stencil::new(moved).evaluate(&net).0 - point) / h;
+            let slope = (evaluate(&net, moved).0 - point) / h;
             assert!(slope.dot(&normal).abs() < 1e-4);
         }
         // Face 0 belongs to the ball about the origin.
@@ -363,7 +373,7 @@ mod tests {
     fn a_vertex_without_faces_is_refused() {
         let mut patches = sample::ball_and_ring();
         patches.position.push([0.0; 3]);
-        let refused = Tessellation::new(&patches.view(), 2).unwrap_err();
+        let refused = Tessellation::new(&patches.view(), Density::Samples(2)).unwrap_err();
         assert!(refused.to_string().contains("part of no face"), "{refused}");
     }
 }

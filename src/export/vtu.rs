@@ -4,9 +4,10 @@
 //! the points of their edge. Arrays follow the XML as raw bytes.
 
 use crate::ExportError;
+use crate::node_order::corners_edges_inside;
 use isospline_artifact::kinds::PatchesView;
 use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, exponents, index, interior_indices,
+    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, interior_indices,
 };
 use std::io::{self, Write};
 
@@ -23,7 +24,7 @@ pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<()
     begin_array(out, sizes[0])?;
     write_points(patches, out)?;
     begin_array(out, sizes[1])?;
-    let order = vtk_order(DEGREE);
+    let order = corners_edges_inside(DEGREE);
     for f in 0..n_faces {
         let numbers = point_numbers(patches, f);
         for &q in &order {
@@ -131,53 +132,11 @@ fn point_numbers(patches: &PatchesView<'_>, f: usize) -> [usize; N_CONTROL] {
     numbers
 }
 
-/// VTK's order of the points of a triangle, as storage indices: corners, inner points of the edges
-/// 0 to 1, 1 to 2 and 2 to 0, then the triangle inside by the same rule.
-fn vtk_order(degree: usize) -> Vec<usize> {
-    let mut out = Vec::with_capacity(N_CONTROL);
-    let mut ring = 0;
-    while degree >= 3 * ring {
-        // Each ring is the border of a triangle of degree `n` whose exponents start at `ring`.
-        let n = degree - 3 * ring;
-        let lift = |e: [usize; 3]| index(e.map(|x| x + ring));
-        if n == 0 {
-            out.push(lift([0; 3]));
-            break;
-        }
-        out.extend((0..3).map(|corner| lift(on_border(n, corner, 0))));
-        for corner in 0..3 {
-            out.extend((1..n).map(|s| lift(on_border(n, corner, s))));
-        }
-        ring += 1;
-    }
-    debug_assert_eq!(out.len(), exponents(degree).count());
-    out
-}
-
-/// Exponents `s` steps from `corner` towards the next one, degree `n`.
-fn on_border(n: usize, corner: usize, s: usize) -> [usize; 3] {
-    let mut e = [0; 3];
-    e[corner] = n - s;
-    e[(corner + 1) % 3] = s;
-    e
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::sample;
     use isospline_geometry::Vec3;
-
-    #[test]
-    fn the_order_of_vtk_names_every_point_once() {
-        let mut order = vtk_order(7);
-        assert_eq!(order[..5], [0, 28, 35, index([6, 1, 0]), index([5, 2, 0])]);
-        assert_eq!(order[21..24], [[5, 1, 1], [1, 5, 1], [1, 1, 5]].map(index));
-        assert_eq!(order[33..], [[3, 2, 2], [2, 3, 2], [2, 2, 3]].map(index));
-        order.sort_unstable();
-        assert!(order.into_iter().eq(0..36));
-        assert_eq!(vtk_order(3).last(), Some(&index([1, 1, 1])));
-    }
 
     #[test]
     fn points_by_number_are_the_nets_in_all_bits() {

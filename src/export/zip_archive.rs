@@ -1,4 +1,4 @@
-//! Zip archives of stored (uncompressed) entries, as numpy's npz wants them.
+//! Zip archives of stored (uncompressed) entries, which npz and 3mf are.
 //!
 //! Sizes and checksums stand before the data, so each entry's content is made twice: once to be
 //! measured, once to be written. Nothing is buffered and the output needs no seek.
@@ -19,8 +19,9 @@ const VERSION: u16 = 20;
 /// 1 January 1980, the first day of the format: archives must not depend on the clock.
 const DATE: u16 = 0x0021;
 
-/// Writes an archive of these entries.
+/// Writes an archive of these entries; `format` is what errors call it.
 pub(crate) fn write(
+    format: &'static str,
     entries: &[(&str, Content<'_>)],
     out: &mut dyn Write,
 ) -> Result<(), ExportError> {
@@ -29,13 +30,13 @@ pub(crate) fn write(
     for &(name, content) in entries {
         let mut meter = Meter::default();
         content(&mut meter)?;
-        let record = Record::new(name, meter, offset)?;
+        let record = Record::new(format, name, meter, offset)?;
         out.write_all(&record.local())?;
         content(out)?;
         central.extend(record.central());
         offset += record.local().len() as u64 + u64::from(record.size);
     }
-    let start = addressable(offset)?;
+    let start = addressable(format, offset)?;
     out.write_all(&central)?;
     let mut end = Vec::new();
     let n_entries = entries.len() as u16;
@@ -77,8 +78,13 @@ struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    fn new(name: &'a str, meter: Meter, offset: u64) -> Result<Self, ExportError> {
-        let (size, offset) = (addressable(meter.size)?, addressable(offset)?);
+    fn new(
+        format: &'static str,
+        name: &'a str,
+        meter: Meter,
+        offset: u64,
+    ) -> Result<Self, ExportError> {
+        let (size, offset) = (addressable(format, meter.size)?, addressable(format, offset)?);
         Ok(Self { name, checksum: meter.checksum.finalize(), size, offset })
     }
 
@@ -117,9 +123,9 @@ impl<'a> Record<'a> {
 }
 
 /// Archives count bytes in 32 bits; their 64-bit form is not written.
-fn addressable(count: u64) -> Result<u32, ExportError> {
+fn addressable(format: &'static str, count: u64) -> Result<u32, ExportError> {
     let limit = u64::from(u32::MAX) - 1;
-    let too_large = ExportError::TooLarge { format: "npz", what: "bytes", count, limit };
+    let too_large = ExportError::TooLarge { format, what: "bytes", count, limit };
     u32::try_from(count).ok().filter(|&n| u64::from(n) <= limit).ok_or(too_large)
 }
 
@@ -132,7 +138,7 @@ mod tests {
         let mut bytes = Vec::new();
         let contents: [(&str, Content<'_>); 2] =
             [("a", &|out| out.write_all(b"first")), ("bc", &|out| out.write_all(b"second"))];
-        write(&contents, &mut bytes).unwrap();
+        write("npz", &contents, &mut bytes).unwrap();
         let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         let end = bytes.len() - 22;
         assert_eq!(u32_at(end), END);
@@ -148,8 +154,8 @@ mod tests {
 
     #[test]
     fn four_gibibytes_are_too_many() {
-        assert!(addressable(1 << 32).is_err());
-        assert!(addressable(u64::from(u32::MAX)).is_err());
-        assert_eq!(addressable(7).unwrap(), 7);
+        assert!(addressable("npz", 1 << 32).is_err());
+        assert!(addressable("npz", u64::from(u32::MAX)).is_err());
+        assert_eq!(addressable("npz", 7).unwrap(), 7);
     }
 }

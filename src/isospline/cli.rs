@@ -6,9 +6,11 @@ mod check;
 mod excerpt;
 mod export;
 pub(crate) mod failure;
+mod habits;
 mod import;
 mod inspect;
 pub(crate) mod interrupt;
+mod lint;
 pub(crate) mod output;
 mod progress;
 mod run;
@@ -39,6 +41,10 @@ pub(crate) fn dispatch(args: &Cli, interrupt: &Interrupt) -> u8 {
         Command::Inspect { file, verify } => (inspect::inspect(file, *verify), false),
         Command::Check(args) => (check::check(args), args.json),
         Command::Export(args) => (export::export(args), false),
+        Command::Lint(args) => (lint::lint(args), args.json),
+        Command::Completions(args) => (habits::completions(args), false),
+        Command::Man(args) => (habits::man(args), false),
+        Command::Schema => (habits::schema(), false),
     };
     outcome.unwrap_or_else(|failure| report(failure, json))
 }

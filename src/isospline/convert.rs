@@ -1,8 +1,10 @@
 //! A caller's own field becomes a surface in memory.
 
 use crate::config::{ConfigError, Inside, StageParams};
+use crate::folder::{CURVES_COUNTER, RELAX_TO, refused, up_to_curves};
 use crate::model::{given_mesh, oriented};
 use crate::stages;
+use crate::tolerance::{Found, Round, Step, next};
 use isospline_artifact::kinds::{Mesh, Patches, PatchesView};
 use isospline_artifact::{Container, MemoryStore, StoreError};
 use isospline_check::{CheckParams, CheckReport, Expected, Job, Surface, SurfaceError};
@@ -29,8 +31,11 @@ use std::sync::Arc;
 pub struct Options<'a> {
     /// The box that holds the surface.
     pub domain: Aabb,
-    /// Faces of the base mesh, at most.
+    /// Faces of the base mesh, at most; of no account where there is a tolerance.
     pub faces: u32,
+    /// Largest error, relative to the diagonal of the box around the vertices, above 0 and below
+    /// 1: the faces follow from it, unless a base mesh is given. Default: none.
+    pub tolerance: Option<f64>,
     /// The value of the field on the surface.
     pub level: f64,
     /// The side that is solid.
@@ -49,6 +54,7 @@ impl Options<'_> {
         Self {
             domain,
             faces: crate::config::DEFAULT_FACES,
+            tolerance: None,
             level: 0.0,
             inside: Inside::Auto,
             base_mesh: None,
@@ -129,27 +135,113 @@ pub fn convert_with_events<'f>(
     options: &Options<'_>,
     on_event: &(dyn Fn(&Event) + Sync),
 ) -> Result<Conversion<'f>, ConvertError> {
-    let field = oriented(field, options.level, options.inside, &options.domain)?;
-    let registry = stages::registry();
-    let base_mesh = options.base_mesh.as_ref().map(given);
-    let params = options.stages.with_faces(options.faces);
-    let graph = stages::graph(&registry, &params, base_mesh.as_ref());
-    let key = ModelKey { name: "closure".to_owned(), content: BTreeMap::new(), hashable: false };
-    let store = MemoryStore::new();
-    let pipeline = Pipeline { registry: &registry, graph: &graph, model: &key, store: &store };
-    let scene = Scene { field: &field, domain: options.domain };
-    let report = pipeline.run(scene, &options.run, on_event)?;
-    let last = graph.last_of_kind(&registry, <Patches as isospline_artifact::Artifact>::KIND);
-    let patches =
-        opened(&registry, &graph, &store, last.expect("invariant: graphs end in patches"))?;
-    let first = opened(&registry, &graph, &store, 0)?;
-    let topology = first.view::<Mesh>()?.topology[0];
-    let expected = Expected {
-        components: Some(topology.components),
-        euler_characteristic: Some(topology.euler_characteristic),
-        tolerance: None,
-    };
-    Ok(Conversion { field, report, patches, expected })
+    let Oriented { level, flipped, .. } =
+        oriented(field, options.level, options.inside, &options.domain)?;
+    let field = move || Oriented { inner: field, level, flipped };
+    let job = ConvertJob { field: &field, options, on_event, registry: stages::registry() };
+    match options.tolerance {
+        Some(tolerance) if options.base_mesh.is_none() => job.within(tolerance),
+        _ => job.whole(&options.stages.with_faces(options.faces)),
+    }
+}
+
+/// What all rounds of a conversion share.
+struct ConvertJob<'a, 'f> {
+    field: &'a dyn Fn() -> Oriented<&'f dyn Field>,
+    options: &'a Options<'a>,
+    on_event: &'a (dyn Fn(&Event) + Sync),
+    registry: Registry,
+}
+
+impl<'f> ConvertJob<'_, 'f> {
+    /// Rounds until the error is just below the tolerance, as near as it comes.
+    fn within(&self, tolerance: f64) -> Result<Conversion<'f>, ConvertError> {
+        let mut rounds: Vec<Round> = Vec::new();
+        let mut latest: Option<(u32, Conversion<'f>)> = None;
+        loop {
+            let (faces, is_whole) = match next(&rounds) {
+                Step::Curves(faces) => (faces, false),
+                Step::Surface(faces) => (faces, true),
+                Step::End(ending) => match latest.filter(|(faces, _)| *faces == ending.faces) {
+                    Some((_, conversion)) => return Ok(conversion),
+                    None => return self.whole(&self.params(ending.faces, tolerance)),
+                },
+            };
+            let params = self.params(faces, tolerance);
+            let made = if is_whole {
+                self.whole(&params).map(Some)
+            } else {
+                let made = self.run(&params, false);
+                made.map(|(run, ..)| curves_of(&run, tolerance)).map(|curves| {
+                    rounds.push(Round { faces, found: Found::Curves { curves } });
+                    None
+                })
+            };
+            match made {
+                Ok(None) => {}
+                Ok(Some(conversion)) => {
+                    let found = conversion.found(tolerance)?;
+                    rounds.push(Round { faces, found });
+                    latest = Some((faces, conversion));
+                }
+                Err(ConvertError::Run(error)) => {
+                    let found = refused(error, &rounds)?;
+                    rounds.push(Round { faces, found });
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn params(&self, faces: u32, tolerance: f64) -> StageParams {
+        let mut params = self.options.stages.with_faces(faces);
+        params.relax.goal = params.relax.goal.max((RELAX_TO * tolerance).min(1.0));
+        params
+    }
+
+    fn whole(&self, params: &StageParams) -> Result<Conversion<'f>, ConvertError> {
+        let (report, graph, store) = self.run(params, true)?;
+        let registry = &self.registry;
+        let last = graph.last_of_kind(registry, <Patches as isospline_artifact::Artifact>::KIND);
+        let last = last.expect("invariant: graphs end in patches");
+        let patches = opened(registry, &graph, &store, last)?;
+        let first = opened(registry, &graph, &store, 0)?;
+        let topology = first.view::<Mesh>()?.topology[0];
+        let expected = Expected {
+            components: Some(topology.components),
+            euler_characteristic: Some(topology.euler_characteristic),
+            tolerance: self.options.tolerance,
+        };
+        Ok(Conversion { field: (self.field)(), report, patches, expected })
+    }
+
+    /// Runs the stages, or those up to the curves.
+    fn run(
+        &self,
+        params: &StageParams,
+        is_whole: bool,
+    ) -> Result<(RunReport, Graph, MemoryStore), ConvertError> {
+        let base_mesh = self.options.base_mesh.as_ref().map(given);
+        let mut graph = stages::graph(&self.registry, params, base_mesh.as_ref());
+        if !is_whole {
+            up_to_curves(&mut graph);
+        }
+        let key =
+            ModelKey { name: "closure".to_owned(), content: BTreeMap::new(), hashable: false };
+        let (store, field) = (MemoryStore::new(), (self.field)());
+        let (registry, model) = (&self.registry, &key);
+        let pipeline = Pipeline { registry, graph: &graph, model, store: &store };
+        let scene = Scene { field: &field, domain: self.options.domain };
+        let report = pipeline.run(scene, &self.options.run, self.on_event)?;
+        Ok((report, graph, store))
+    }
+}
+
+/// Largest error of a curve, times the tolerance.
+fn curves_of(run: &RunReport, tolerance: f64) -> f64 {
+    let records = run.nodes.iter().filter_map(|node| node.provenance.as_ref());
+    let errors = records.filter_map(|r| r.counters.maxima.get(CURVES_COUNTER));
+    errors.fold(0.0, |acc: f64, e| acc.max(*e)) / tolerance
 }
 
 impl Conversion<'_> {
@@ -176,6 +268,14 @@ impl Conversion<'_> {
         };
         let threads = Threads::new(RunOptions::default().threads);
         Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
+    }
+
+    fn found(&self, tolerance: f64) -> Result<Found, ConvertError> {
+        let limits = CheckParams { error: Some(1.0), ..CheckParams::default() };
+        let check = self.check(&limits)?;
+        let surface = Some(check.rel_error_max / tolerance).filter(|error| error.is_finite());
+        let curves = curves_of(&self.report, tolerance);
+        Ok(Found::Surface { curves, surface, sound: check.pass })
     }
 
     /// Counters of every fallback that a stage took, as `stage.name`.

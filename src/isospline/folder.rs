@@ -2,6 +2,7 @@
 
 mod rounds;
 
+pub(crate) use rounds::{CURVES_COUNTER, RELAX_TO, refused, up_to_curves};
 pub use rounds::{ROUNDS_NOTE, Rounds};
 
 use crate::config::ModelFile;

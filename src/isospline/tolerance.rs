@@ -35,6 +35,8 @@ pub enum Found {
         /// Whether all else that the check looks at is in order.
         sound: bool,
     },
+    /// A stage refused so many faces.
+    TooMany,
     /// A stage refused so few faces.
     Refused {
         /// Its code.
@@ -157,6 +159,8 @@ struct Search<'a> {
     high: Option<&'a Round>,
     /// The most faces below `high` that do not.
     low: Option<&'a Round>,
+    /// So many faces may not be asked for.
+    limit: u32,
 }
 
 impl<'a> Search<'a> {
@@ -172,11 +176,14 @@ impl<'a> Search<'a> {
         let good = good.map(|r| r.faces).min().unwrap_or(u32::MAX);
         let is_unsound = |r: &&Round| r.is_of_surface() && r.sound().is_none() && r.faces < good;
         let unsound = rounds.iter().filter(is_unsound).map(|r| r.faces).max();
-        let mut search = Self { rounds, ratio, unsound, high: None, low: None };
+        let too_many = rounds.iter().filter(|r| r.found == Found::TooMany);
+        let limit = too_many.map(|r| r.faces).min().unwrap_or(u32::MAX).min(MOST_FACES);
+        let mut search = Self { rounds, ratio, unsound, high: None, low: None, limit };
+        let rounds = || rounds.iter().filter(|r| r.found != Found::TooMany);
         let does = |r: &&Round| search.estimate(r) <= 1.0;
-        let high = rounds.iter().filter(does).min_by_key(|r| r.faces);
+        let high = rounds().filter(does).min_by_key(|r| r.faces);
         let below = |r: &&Round| high.is_none_or(|high| r.faces < high.faces);
-        let low = rounds.iter().filter(|r| !does(r)).filter(below).max_by_key(|r| r.faces);
+        let low = rounds().filter(|r| !does(r)).filter(below).max_by_key(|r| r.faces);
         (search.high, search.low) = (high, low);
         search
     }
@@ -191,7 +198,7 @@ impl<'a> Search<'a> {
         match self.rounds.iter().find(same).unwrap_or(round).found {
             Found::Curves { curves } => curves * self.ratio,
             Found::Surface { surface: Some(surface), sound: true, .. } => surface,
-            Found::Surface { .. } | Found::Refused { .. } => f64::INFINITY,
+            Found::Surface { .. } | Found::Refused { .. } | Found::TooMany => f64::INFINITY,
         }
     }
 
@@ -230,7 +237,7 @@ impl<'a> Search<'a> {
         };
         let no_better =
             |r: &Round| 3 * r.faces <= low.faces && self.estimate(r) <= 1.5 * self.estimate(low);
-        low.faces >= MOST_FACES || self.rounds.iter().any(no_better)
+        NEAR * f64::from(low.faces) >= f64::from(self.limit) || self.rounds.iter().any(no_better)
     }
 
     /// Whether too many and too few faces are known to be close together.
@@ -254,7 +261,7 @@ impl<'a> Search<'a> {
             Some(high) => power(low * f64::from(high), 0.5),
             None => SOUND_STEP * low,
         };
-        Some((faces.round() as u32).min(MOST_FACES))
+        Some((faces.round() as u32).min(self.limit))
     }
 
     /// The faces that seem to have the error aimed at.
@@ -262,7 +269,9 @@ impl<'a> Search<'a> {
         let at = |r: &Round| (f64::from(r.faces), self.estimate(r));
         let faces = match (self.low.map(at), self.high.map(at)) {
             (Some((low, error)), None) if error.is_finite() => {
-                low * power(error / AIM, 1.0 / ORDER).clamp(1.15, 4.0)
+                let wanted = low * power(error / AIM, 1.0 / ORDER).clamp(1.15, 4.0);
+                let limit = f64::from(self.limit);
+                if wanted < limit { wanted } else { power(low * limit, 0.5) }
             }
             // Refused.
             (Some((low, _)), None) => 1.4 * low,
@@ -278,7 +287,7 @@ impl<'a> Search<'a> {
             }
             (None, None) => f64::from(FIRST_FACES),
         };
-        (faces.round() as u32).clamp(4, MOST_FACES)
+        (faces.round() as u32).clamp(4, self.limit)
     }
 }
 
@@ -354,6 +363,28 @@ mod tests {
         let (ending, rounds) = play(|faces| 50.0 + 1e3 / faces, 1.0, 4);
         assert_eq!(ending.verdict, Verdict::NotReached);
         assert!(surfaces(&rounds) <= 2 && rounds.len() <= 6, "{rounds:?}");
+    }
+
+    #[test]
+    fn where_more_faces_are_refused_the_most_that_are_not_are_taken() {
+        let mut rounds: Vec<Round> = Vec::new();
+        let ending = loop {
+            let (faces, is_surface) = match next(&rounds) {
+                Step::Curves(faces) => (faces, false),
+                Step::Surface(faces) => (faces, true),
+                Step::End(ending) => break ending,
+            };
+            let curves = power(9000.0 / f64::from(faces), 3.0);
+            let found = match is_surface {
+                _ if faces > 2500 => Found::TooMany,
+                true => Found::Surface { curves, surface: Some(curves), sound: true },
+                false => Found::Curves { curves },
+            };
+            rounds.push(Round { faces, found });
+            assert!(rounds.len() < 20, "{rounds:?}");
+        };
+        assert_eq!(ending.verdict, Verdict::NotReached, "{rounds:?}");
+        assert!((2100..=2500).contains(&ending.faces), "{rounds:?}");
     }
 
     #[test]

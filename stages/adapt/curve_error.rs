@@ -27,6 +27,9 @@ const BATCHES_A_TASK: usize = 4;
 
 /// Eight iterations rank edges as thirty do.
 const NORMAL: NormalOptions = NormalOptions { samples: 10, iterations: 8 };
+/// Iterations for the few edges that have no sound curve after those: most come to one, and an
+/// edge that is taken for hopeless draws faces that others need.
+const PATIENT: NormalOptions = NormalOptions { iterations: 40, ..NORMAL };
 
 /// An edge to be judged.
 #[derive(Clone, Copy, Debug)]
@@ -49,12 +52,20 @@ pub(crate) enum Measure {
     /// By [TK, Eq. (9)].
     Paper,
     /// By normal distance.
-    Normal(NormalFit),
+    Normal(NormalMeasure),
+}
+
+/// Fits by normal distance, short and long.
+#[derive(Clone, Debug)]
+pub(crate) struct NormalMeasure {
+    quick: NormalFit,
+    patient: NormalFit,
 }
 
 impl Measure {
     pub(crate) fn normal() -> Self {
-        Self::Normal(NormalFit::new(NORMAL))
+        let (quick, patient) = (NormalFit::new(NORMAL), NormalFit::new(PATIENT));
+        Self::Normal(NormalMeasure { quick, patient })
     }
 
     /// Distance from the surface of the curve between each pair of vertices, in model units; on
@@ -78,7 +89,7 @@ impl Measure {
 
 /// Largest normal distance of the curve of each edge, as the network stage will fit it, and
 /// [`PARAMETRIC_PART`] of the distance of the curve of the paper.
-fn normal_errors_of(fit: &NormalFit, field: &dyn Field, edges: &[JudgedEdge<'_>]) -> Vec<f64> {
+fn normal_errors_of(fits: &NormalMeasure, field: &dyn Field, edges: &[JudgedEdge<'_>]) -> Vec<f64> {
     let edge = |JudgedEdge { ends, wings }: &JudgedEdge<'_>| NormalEdge {
         ends: Ends {
             points: ends.map(|v| v.position),
@@ -88,15 +99,21 @@ fn normal_errors_of(fit: &NormalFit, field: &dyn Field, edges: &[JudgedEdge<'_>]
         slants: wings.map_or([Slant::free(); 2], |wings| slants(ends, &wings)),
     };
     let given: Vec<NormalEdge> = edges.iter().map(edge).collect();
-    let curves = fit.fit(field, &given, &vec![None; given.len()]);
+    let fitted = |fit: &NormalFit, given: &[NormalEdge]| {
+        fit.fit(field, given, &vec![None; given.len()]).into_iter().map(|c| c.map(|c| c.error))
+    };
+    let mut normal: Vec<Option<f64>> = fitted(&fits.quick, &given).collect();
+    let hard: Vec<usize> = (0..given.len()).filter(|&i| normal[i].is_none()).collect();
+    let again: Vec<NormalEdge> = hard.iter().map(|&i| given[i]).collect();
+    for (i, error) in hard.into_iter().zip(fitted(&fits.patient, &again)) {
+        normal[i] = error;
+    }
     let parametric = errors_of(field, &edges.iter().map(|e| e.ends).collect::<Vec<_>>());
-    let judged = curves.into_iter().zip(parametric);
-    judged
-        .map(|(curve, parametric)| {
-            // Without one the curve of the paper stays.
-            curve.map_or(parametric, |c| c.error + PARAMETRIC_PART * parametric)
-        })
-        .collect()
+    // Without a curve that of the paper stays.
+    let sum = |(normal, parametric): (Option<f64>, f64)| {
+        normal.map_or(parametric, |normal| normal + PARAMETRIC_PART * parametric)
+    };
+    normal.into_iter().zip(parametric).map(sum).collect()
 }
 
 fn slants([a, b]: &[&Vertex; 2], [left, right]: &[&Vertex; 2]) -> [Slant; 2] {

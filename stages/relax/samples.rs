@@ -15,6 +15,8 @@ pub(crate) const LANES: usize = 4;
 const N_BOUNDARY: usize = N_CONTROL - N_INTERIOR;
 /// Every so many samples the patch is tested for folds: folds are wider than three samples.
 const FOLD_STRIDE: usize = 3;
+/// Cosine of the angle, 10 degrees, from which a patch may be folded between the samples.
+const TILT: f64 = 0.985;
 /// Steps a side between the places on the boundary that are tested: beside the long side of a
 /// sliver, folds do not reach the samples.
 const RIM_STEPS: usize = 12;
@@ -86,26 +88,30 @@ impl Samples {
         self.even.each_ref().map(|weights| combine(weights, net))
     }
 
-    /// Samples whose patch normal points against `normal`, and places on the boundary where it
-    /// points against `rim_normal`.
+    /// Samples whose patch normal points against `normal`, and those where it stands off from it by
+    /// more than [`TILT`]; with the places on the boundary and `rim_normal`.
     pub(crate) fn folded(
         &self,
         net: &[Vec3; N_CONTROL],
         interior: &Interior,
         normal: &[Vec3],
         rim_normal: &[Vec3],
-    ) -> usize {
+    ) -> [usize; 2] {
         let mut net = *net;
         for (&i, &p) in self.interior.iter().zip(interior) {
             net[i] = p;
         }
-        let is_folded = |(weights, outward): (&[[f64; N_CONTROL]; 2], &Vec3)| {
-            let [a, b] = weights.each_ref().map(|row| combine(row, &net));
-            a.cross(&b).dot(outward) < 0.0
-        };
         let inside = self.tangents.iter().zip(normal.iter().step_by(FOLD_STRIDE));
         let rim = self.rim.iter().map(|(_, tangents)| tangents).zip(rim_normal);
-        inside.chain(rim).filter(|pair| is_folded(*pair)).count()
+        let mut counts = [0, 0];
+        for (weights, outward) in inside.chain(rim) {
+            let [a, b] = weights.each_ref().map(|row| combine(row, &net));
+            let own = a.cross(&b);
+            let along = own.dot(outward);
+            counts[0] += usize::from(along < 0.0);
+            counts[1] += usize::from(along < TILT * own.norm());
+        }
+        counts
     }
 }
 
@@ -191,7 +197,7 @@ mod tests {
         }
         let up = |n: usize, side: f64| vec![side * Vec3::z(); n];
         let folded = |side| samples.folded(&net, &interior, &up(55, side), &up(33, side));
-        assert_eq!([folded(1.0), folded(-1.0)], [0, 19 + 33]);
+        assert_eq!([folded(1.0), folded(-1.0)], [[0; 2], [19 + 33; 2]]);
     }
 
     #[test]

@@ -66,7 +66,7 @@ impl Problem<'_> {
         let here = self.measure(&faces, &interior);
         let nu = vec![0.0; tile.edges.len()];
         let idle = Outcome { interior: None, nu, damping, gain: 0.0 };
-        if here.unsound == 0 && here.largest() <= self.goal {
+        if here.unsound + here.tilted == 0 && here.largest() <= self.goal {
             return idle;
         }
         let visit =
@@ -137,8 +137,9 @@ impl Problem<'_> {
             tile.faces.iter().map(|&f| Face::new(self, f as usize)).collect();
         let places: Vec<Vec3> = faces.iter().flat_map(|f| self.samples.rim(&f.net)).collect();
         let jets = self.jets(&places);
-        // A normal that is no number counts neither as a fold nor against one.
-        let mut normals = jets.iter().map(|jet| jet.gradient);
+        // Where the field has no normal nothing is folded.
+        let normal = |jet: &Jet1| jet.gradient.try_normalize(0.0).unwrap_or_default();
+        let mut normals = jets.iter().map(normal);
         for face in &mut faces {
             let n = self.samples.rim(&face.net).count();
             face.rim_normal = normals.by_ref().take(n).collect();
@@ -160,7 +161,9 @@ impl Problem<'_> {
         }
         let mut out = Measured::of(&self.jets(&points));
         for ((face, inner), normals) in faces.iter().zip(interior).zip(out.normal.chunks_exact(n)) {
-            out.folds.push(self.samples.folded(&face.net, inner, normals, &face.rim_normal));
+            let [folds, tilted] = self.samples.folded(&face.net, inner, normals, &face.rim_normal);
+            out.folds.push(folds);
+            out.tilted += tilted;
         }
         out.unsound += out.folds.iter().sum::<usize>();
         out
@@ -215,7 +218,7 @@ struct Face {
     moves: FaceMoves,
     /// Mean side.
     size: f64,
-    /// Gradients of the field at the places on the boundary that are tested for folds.
+    /// Unit normals of the field at the places on the boundary that are tested for folds.
     rim_normal: Vec<Vec3>,
 }
 
@@ -267,6 +270,8 @@ struct Measured {
     folds: Vec<usize>,
     /// Samples without a distance, and all folds.
     unsound: usize,
+    /// Samples whose normal is far off.
+    tilted: usize,
 }
 
 impl Measured {
@@ -274,7 +279,7 @@ impl Measured {
     fn of(jets: &[Jet1]) -> Self {
         let n = jets.len();
         let (distance, normal) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let mut out = Self { distance, normal, sum_sq: 0.0, folds: Vec::new(), unsound: 0 };
+        let mut out = Self { distance, normal, sum_sq: 0.0, folds: Vec::new(), unsound: 0, tilted: 0 };
         for jet in jets {
             let slope = jet.gradient.norm();
             let distance = jet.value / slope;

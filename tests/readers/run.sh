@@ -25,7 +25,10 @@ needs() {
         vtu) echo "vtk vtkmodules.vtkIOXML" ;;
         meshes) echo "trimesh,manifold3d,vtk trimesh manifold3d vtkmodules.vtkFiltersCore" ;;
         step) echo "occt OCP.STEPControl" ;;
-        volume_mesh) echo "gmsh gmsh" ;;
+        volume_mesh | msh) echo "gmsh gmsh" ;;
+        tolerance) echo "vtk vtkmodules.vtkIOPLY" ;;
+        printing) echo "lib3mf lib3mf" ;;
+        schema) echo "jsonschema jsonschema tomllib" ;;
     esac
 }
 
@@ -52,10 +55,12 @@ make_exports() {
     for model in sphere_80 torus_regular; do
         "$isospline" run "$root/configs/$model.toml" --set target.fit=paper --out "$1/$model" \
             >"$1/$model.log" 2>&1 || { cat "$1/$model.log"; exit 1; }
-        for format in npz vtu step glb obj ply stl; do
+        for format in npz vtu msh bv step glb obj ply stl 3mf; do
             "$isospline" export "$1/$model" --format "$format" -o "$1/$model.$format" >/dev/null
         done
+        "$isospline" lint "$1/$model.step" | sed "s/^/isospline lint: $model.step: /"
     done
+    "$isospline" schema >"$1/isospline.schema.json"
 }
 
 read_with() {
@@ -67,7 +72,7 @@ read_with() {
     "$python" "$here/$script.py" "$dir"
 }
 
-scripts="npz vtu meshes step volume_mesh"
+scripts="npz vtu tolerance meshes printing step volume_mesh msh schema"
 for script in $scripts; do
     read -r _ modules <<<"$(needs "$script")"
     for module in $modules; do

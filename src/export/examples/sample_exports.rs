@@ -4,6 +4,7 @@
 //! `cargo run -p isospline-export --example sample_exports -- FOLDER`
 
 #[path = "../sample.rs"]
+#[expect(dead_code, reason = "some samples are for tests alone")]
 mod sample;
 
 use isospline_artifact::kinds::Patches;

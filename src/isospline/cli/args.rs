@@ -1,5 +1,10 @@
 //! The command line: commands, options and their help.
 
+use crate::cli::export::{EXPORT_EXAMPLES, ExportArgs};
+use crate::cli::habits::{
+    COMPLETIONS_EXAMPLES, CompletionsArgs, MAN_EXAMPLES, ManArgs, SCHEMA_EXAMPLES,
+};
+use crate::cli::lint::{LINT_EXAMPLES, LintArgs};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -74,6 +79,18 @@ pub(crate) enum Command {
     /// Write a finished surface in another format
     #[command(after_help = EXPORT_EXAMPLES)]
     Export(ExportArgs),
+    /// Look through the text of an exported STEP file for what CAD programs heal in silence
+    #[command(after_help = LINT_EXAMPLES)]
+    Lint(LintArgs),
+    /// Print the completions of commands and options for a shell
+    #[command(after_help = COMPLETIONS_EXAMPLES)]
+    Completions(CompletionsArgs),
+    /// Print the manual page of a command, or write those of all
+    #[command(after_help = MAN_EXAMPLES)]
+    Man(ManArgs),
+    /// Print the JSON Schema of model files, for editors
+    #[command(after_help = SCHEMA_EXAMPLES)]
+    Schema,
 }
 
 const RUN_EXAMPLES: &str = "\
@@ -128,15 +145,6 @@ Examples:
   isospline check deccube.npz --model configs/deccube.toml
 
 The exit code is 1 if the surface does not pass.";
-
-const EXPORT_EXAMPLES: &str = "\
-Examples:
-  isospline export out/deccube --format glb
-  isospline export out/deccube --format vtu -o deccube.vtu
-  isospline export out/deccube --format step --compact
-  isospline export out/deccube --format stl --samples 16
-
-vtu, npz and step hold the patches exactly, step as closed solids; glb, obj, ply and stl hold triangles.";
 
 /// Which model, and how to run it.
 #[derive(Debug, Args)]
@@ -255,57 +263,4 @@ pub(crate) struct CheckArgs {
     /// Print the figures as JSON
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct ExportArgs {
-    /// The model folder
-    pub(crate) dir: PathBuf,
-    /// The format
-    #[arg(long, value_enum)]
-    pub(crate) format: FormatArg,
-    /// The file; default DIR/<model name>.<format>
-    #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: Option<PathBuf>,
-    /// Segments an edge is cut into, for formats of triangles
-    #[arg(long, value_name = "N", default_value_t = 8,
-        value_parser = clap::value_parser!(u32).range(1..=256))]
-    pub(crate) samples: u32,
-    /// STEP: one patch a triangle with a collapsed side in place of three quads
-    #[arg(long)]
-    pub(crate) compact: bool,
-    /// STEP: curves in the parameters of the faces too
-    #[arg(long)]
-    pub(crate) pcurves: bool,
-    /// STEP: the application protocol
-    #[arg(long, value_enum, default_value = "ap242")]
-    pub(crate) schema: SchemaArg,
-}
-
-/// Application protocols of STEP files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum SchemaArg {
-    /// Managed model based 3D engineering
-    Ap242,
-    /// Automotive design
-    Ap214,
-}
-
-/// Formats of `export`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum FormatArg {
-    /// VTK unstructured grid with exact Bézier cells
-    Vtu,
-    /// STEP solids of exact patches, for CAD programs
-    Step,
-    /// Binary glTF, to look at
-    Glb,
-    /// Wavefront OBJ
-    Obj,
-    /// Stanford PLY
-    Ply,
-    /// Binary STL
-    Stl,
-    /// Arrays for numpy: vertices, faces, control points
-    Npz,
 }

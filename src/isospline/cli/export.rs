@@ -1,11 +1,97 @@
 //! Command `export`.
 
-use crate::cli::args::{ExportArgs, FormatArg, SchemaArg};
 use crate::cli::failure::Failure;
 use crate::cli::output::{say, size};
+use clap::Args;
 use isospline::ModelFolder;
 use isospline_artifact::kinds::Patches;
-use isospline_export::{About, ExportError, Format, Options, StepOptions, StepSchema};
+use isospline_export::{About, Density, ExportError, Format, Options, StepOptions, StepSchema};
+use std::path::PathBuf;
+
+/// What `export --help` ends with.
+pub(crate) const EXPORT_EXAMPLES: &str = "\
+Examples:
+  isospline export out/deccube --format step
+  isospline export out/deccube --format step --compact --schema ap214
+  isospline export out/deccube --format glb
+  isospline export out/deccube --format stl --tolerance 1e-5 -o deccube.stl
+  isospline export out/deccube --format 3mf --chord 0.01
+  isospline export out/deccube --format msh --order 3
+
+step, vtu, msh, bv and npz hold the patches exactly (msh up to order 7); glb, obj, ply, stl and 3mf
+hold triangles, no farther from the patches than --tolerance. `isospline lint` looks through a STEP
+file.";
+
+/// What to write, and how.
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// The model folder
+    pub(crate) dir: PathBuf,
+    /// The format
+    #[arg(long, value_enum)]
+    pub(crate) format: FormatArg,
+    /// The file; default DIR/<model name>.<format>
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Triangles: largest distance of the patches from them, of the diagonal of the box around the
+    /// vertices [default: 1e-4]
+    #[arg(long, value_name = "X", conflicts_with_all = ["chord", "samples"])]
+    pub(crate) tolerance: Option<f64>,
+    /// Triangles: the same as a length in model units
+    #[arg(long, value_name = "LENGTH", conflicts_with = "samples")]
+    pub(crate) chord: Option<f64>,
+    /// Triangles: as many segments along every edge in place of a tolerance
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub(crate) samples: Option<u32>,
+    /// MSH: order of the curved triangles; 7 is exact
+    #[arg(long, value_name = "N", default_value_t = 7,
+        value_parser = clap::value_parser!(u32).range(1..=7))]
+    pub(crate) order: u32,
+    /// STEP: one patch a triangle with a collapsed side in place of three quads
+    #[arg(long)]
+    pub(crate) compact: bool,
+    /// STEP: curves in the parameters of the faces too
+    #[arg(long)]
+    pub(crate) pcurves: bool,
+    /// STEP: the application protocol
+    #[arg(long, value_enum, default_value = "ap242")]
+    pub(crate) schema: SchemaArg,
+}
+
+/// Application protocols of STEP files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum SchemaArg {
+    /// Managed model based 3D engineering
+    Ap242,
+    /// Automotive design
+    Ap214,
+}
+
+/// Formats of `export`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum FormatArg {
+    /// STEP solids of exact patches, for CAD programs
+    Step,
+    /// Gmsh mesh of curved triangles, for simulation
+    Msh,
+    /// VTK unstructured grid with exact Bézier cells, for ParaView
+    Vtu,
+    /// 3MF with its unit, for printing
+    #[value(name = "3mf")]
+    ThreeMf,
+    /// Binary STL
+    Stl,
+    /// Binary glTF, to look at
+    Glb,
+    /// Wavefront OBJ
+    Obj,
+    /// Stanford PLY
+    Ply,
+    /// BezierView text with exact patches
+    Bv,
+    /// Arrays for numpy: vertices, faces, control points
+    Npz,
+}
 
 /// Writes a finished surface in another format.
 pub(crate) fn export(args: &ExportArgs) -> Result<u8, Failure> {
@@ -16,7 +102,8 @@ pub(crate) fn export(args: &ExportArgs) -> Result<u8, Failure> {
     let container = folder.patches()?;
     let patches = container.view::<Patches>()?;
     let about = about(&folder, patches.face.len());
-    let options = Options { samples: args.samples, about, step: step_options(args) };
+    let options =
+        Options { density: density(args), order: args.order, about, step: step_options(args) };
     isospline_export::write_file(format, &patches, &options, &path)
         .map_err(|error| failure(&error, &path))?;
     let length = std::fs::metadata(&path).map_or(0, |data| data.len());
@@ -37,6 +124,12 @@ fn about(folder: &ModelFolder, n_faces: usize) -> About {
     About { name: model.name.clone(), unit: model.unit.unwrap_or_default(), provenance }
 }
 
+fn density(args: &ExportArgs) -> Density {
+    let samples = args.samples.map(Density::Samples);
+    let length = args.chord.map(Density::Length);
+    samples.or(length).or(args.tolerance.map(Density::Relative)).unwrap_or_default()
+}
+
 fn step_options(args: &ExportArgs) -> StepOptions {
     let schema = match args.schema {
         SchemaArg::Ap242 => StepSchema::Ap242,
@@ -52,19 +145,26 @@ fn failure(error: &ExportError, path: &std::path::Path) -> Failure {
             Failure::io(message).helped("see whether the folder is there")
         }
         ExportError::NotRegular { .. } => Failure::io(message).helped("give another path with -o"),
-        ExportError::Samples { .. } | ExportError::TooLarge { .. } => Failure::usage(message),
+        ExportError::Samples { .. }
+        | ExportError::Order { .. }
+        | ExportError::ToleranceRange { .. }
+        | ExportError::TooLarge { .. } => Failure::usage(message),
+        ExportError::Tolerance { .. } => Failure::usage(message).helped("give a larger tolerance"),
         ExportError::Degree { .. } | ExportError::Incoherent { .. } => Failure::damaged(message),
     }
 }
 
 fn format(arg: FormatArg) -> Format {
     match arg {
-        FormatArg::Vtu => Format::Vtu,
         FormatArg::Step => Format::Step,
+        FormatArg::Msh => Format::Msh,
+        FormatArg::Vtu => Format::Vtu,
+        FormatArg::ThreeMf => Format::ThreeMf,
+        FormatArg::Stl => Format::Stl,
         FormatArg::Glb => Format::Glb,
         FormatArg::Obj => Format::Obj,
         FormatArg::Ply => Format::Ply,
-        FormatArg::Stl => Format::Stl,
+        FormatArg::Bv => Format::Bv,
         FormatArg::Npz => Format::Npz,
     }
 }

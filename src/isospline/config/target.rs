@@ -21,6 +21,9 @@ pub struct TargetTable {
 /// Faces where none are asked for: enough for a genus of about five, done in a blink.
 pub const DEFAULT_FACES: u32 = 2000;
 
+/// A tenth of what values of fields are rounded to, times the diagonal, where formulas are kind.
+const LEAST_TOLERANCE: f64 = 1e-12;
+
 /// Keys of which one is given.
 const EXCLUSIVE: [&str; 3] = ["faces", "tolerance", "tolerance_abs"];
 
@@ -63,8 +66,8 @@ impl TargetTable {
                 "at least 4, the faces of a tetrahedron",
             ));
         }
-        if self.tolerance.is_some_and(|t| !(t > 0.0 && t < 1.0)) {
-            let message = "above 0 and below 1, of the box diagonal";
+        if self.tolerance.is_some_and(|t| !(t >= LEAST_TOLERANCE && t < 1.0)) {
+            let message = "from 1e-12, where rounding begins, to below 1, of the box diagonal";
             return Err(out_of_range(doc, "target.tolerance", message));
         }
         if self.tolerance_abs.is_some_and(|t| !(t > 0.0 && t.is_finite())) {

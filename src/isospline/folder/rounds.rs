@@ -17,6 +17,8 @@ use serde::{Deserialize, Serialize};
 /// Name of the note of the rounds.
 pub const ROUNDS_NOTE: &str = "rounds.json";
 
+/// Code of a stage that asks for fewer faces.
+const TOO_MANY: &str = "too-many-cells";
 /// Codes of stages that ask for more faces.
 const TOO_FEW: [&str; 6] = [
     "too-few-faces",
@@ -28,11 +30,11 @@ const TOO_FEW: [&str; 6] = [
 ];
 
 /// Part of the tolerance from which patches are not brought nearer: the worst patch decides.
-const RELAX_TO: f64 = 0.3;
+pub(crate) const RELAX_TO: f64 = 0.3;
 
 /// The last stage of a round of curves, and the largest error that it counts.
 const CURVES_STAGE: &str = "network";
-const CURVES_COUNTER: &str = "curve_distance_max_rel";
+pub(crate) const CURVES_COUNTER: &str = "curve_distance_max_rel";
 
 /// What is kept of a search.
 #[derive(Debug, Serialize, Deserialize)]
@@ -126,8 +128,7 @@ impl ModelFolder {
     ) -> Result<RunReport, RunError> {
         let mut graph = self.sized_graph(faces);
         if !is_whole {
-            let curves = graph.nodes.iter().position(|node| node.stage == CURVES_STAGE);
-            graph.nodes.truncate(curves.expect("invariant: every graph fits curves") + 1);
+            up_to_curves(&mut graph);
         }
         let (registry, model) = (&self.registry, &self.key);
         let pipeline = Pipeline { registry, graph: &graph, model, store: &self.store };
@@ -206,8 +207,17 @@ impl ModelFolder {
     }
 }
 
-/// The round that a refusal makes; the refusal itself if more faces do not help.
-fn refused(error: RunError, rounds: &[Round]) -> Result<Found, RunError> {
+/// Takes away what comes after the curves.
+pub(crate) fn up_to_curves(graph: &mut Graph) {
+    let curves = graph.nodes.iter().position(|node| node.stage == CURVES_STAGE);
+    graph.nodes.truncate(curves.expect("invariant: every graph fits curves") + 1);
+}
+
+/// The round that a refusal makes; the refusal itself if no other number of faces helps.
+pub(crate) fn refused(error: RunError, rounds: &[Round]) -> Result<Found, RunError> {
+    if error.diagnosis().is_some_and(|d| d.code() == TOO_MANY) && !rounds.is_empty() {
+        return Ok(Found::TooMany);
+    }
     let Some(code) = error.diagnosis().map(|d| d.code()).filter(|code| TOO_FEW.contains(code))
     else {
         return Err(error);
