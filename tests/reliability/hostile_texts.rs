@@ -208,7 +208,7 @@ pub(crate) fn fields() -> Vec<Case> {
     let case = |&(name, formula, more, expected): &Field| {
         let text = format!(
             "[model]\nformula = \"{formula}\"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n{more}\n\
-             [target]\nfaces = 600\n"
+             [target]\nfaces = 600\nfit = \"paper\"\n"
         );
         Case { name, model: text.into_bytes(), expected }
     };
@@ -222,7 +222,8 @@ pub(crate) fn files() -> Vec<Case> {
     let on_mesh = |&(name, mesh, expected): &File| {
         let text = format!(
             "[model]\nformula = \"x^2+y^2+z^2-1\"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n\
-             base_mesh = \"{mesh}\"\n[adapt]\nmax_turning_deg = 120\nmax_slope = 1.0\n"
+             base_mesh = \"{mesh}\"\n[adapt]\nmax_turning_deg = 120\nmax_slope = 1.0\n\
+             [target]\nfit = \"paper\"\n"
         );
         Case { name, model: text.into_bytes(), expected }
     };
