@@ -33,6 +33,8 @@ use tiling::{Tile, Tiling};
 
 /// A visit that lowers a tile's squared distance by a smaller part than this lets it rest.
 const LITTLE_GAIN: f64 = 0.05;
+/// Steps that a tile takes however near it is.
+const FIRST_STEPS: u32 = 2;
 /// Sweeps that such a tile rests: plateaus come before the last factor ten, so it is not done.
 const REST: u32 = 3;
 
@@ -79,9 +81,7 @@ impl Stage for Relax {
         };
         let samples = Samples::new(self.params.grid);
         let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
-        let goal = self.params.goal * mesh.bounds[0].diagonal;
-        let (moves, samples, field) = (&moves, &samples, ctx.field);
-        let problem = Problem { mesh, network, moves, samples, field, goal };
+        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
         let mut counters = self.sweep(ctx, &problem, &mut surface)?;
         let conditions = Conditions { mesh, curvature, network, vertices };
         let restored = conditions.restore(ctx.host, &mut surface.interior, &surface.nu);
@@ -125,8 +125,9 @@ impl Relax {
         surface: &mut Surface,
     ) -> Result<Counters, RelaxError> {
         let Tiling { tiles, colours } = Tiling::new(&problem.mesh, self.params.tile as usize);
-        let mut states = vec![TileState { damping: FIRST_DAMPING, rest: 0 }; tiles.len()];
+        let mut states = vec![TileState { damping: FIRST_DAMPING, rest: 0, steps: 0 }; tiles.len()];
         let mut counters = Counters::default();
+        let goal = self.params.goal * problem.mesh.bounds[0].diagonal;
         let of = u64::from(self.params.sweeps) * colours.len() as u64;
         let all = std::iter::repeat_n(&colours, self.params.sweeps as usize).flatten();
         for (done, colour) in all.enumerate() {
@@ -138,14 +139,18 @@ impl Relax {
             }
             let outcomes = map(ctx.host, awake.len(), |i| {
                 let t = awake[i];
-                problem.visit(&tiles[t], &surface.interior, states[t].damping)
+                // Surfaces of the stages before may be folded where no sample sees it; the first
+                // steps unfold them.
+                let goal = if states[t].steps < FIRST_STEPS { 0.0 } else { goal };
+                problem.visit(&tiles[t], &surface.interior, states[t].damping, goal)
             });
             counters.count("visits", awake.len() as u64);
             for (t, outcome) in awake.into_iter().zip(outcomes) {
                 // Its neighbours may move what it shares with them: one that is near is looked at
                 // again too.
                 let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
-                states[t] = TileState { damping: outcome.damping, rest };
+                let steps = states[t].steps + u32::from(outcome.interior.is_some());
+                states[t] = TileState { damping: outcome.damping, rest, steps };
                 counters.count("visits_without_step", u64::from(outcome.interior.is_none()));
                 surface.take(&tiles[t], outcome);
             }
@@ -161,6 +166,8 @@ struct TileState {
     damping: f64,
     /// Sweeps that it sits out.
     rest: u32,
+    /// Steps taken.
+    steps: u32,
 }
 
 fn interior(row: &[f64; 45]) -> Interior {

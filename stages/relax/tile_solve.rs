@@ -38,8 +38,6 @@ pub(crate) struct Problem<'a> {
     pub(crate) moves: &'a Moves,
     pub(crate) samples: &'a Samples,
     pub(crate) field: &'a dyn Field,
-    /// Distance that is near enough, in model units.
-    pub(crate) goal: f64,
 }
 
 /// What a visit leaves behind.
@@ -56,15 +54,22 @@ pub(crate) struct Outcome {
 }
 
 impl Problem<'_> {
-    /// One step that lowers the squared distance of the tile's samples, if one of a few does.
-    pub(crate) fn visit(&self, tile: &Tile, surface: &[Interior], damping: f64) -> Outcome {
+    /// One step that lowers the squared distance of the tile's samples, if one of a few does; none
+    /// if all are within `goal`, in model units.
+    pub(crate) fn visit(
+        &self,
+        tile: &Tile,
+        surface: &[Interior],
+        damping: f64,
+        goal: f64,
+    ) -> Outcome {
         let faces: Vec<Face> = tile.faces.iter().map(|&f| Face::new(self, f as usize)).collect();
         let numbering = Numbering::new(&self.mesh, tile);
         let interior: Vec<Interior> = tile.faces.iter().map(|&f| surface[f as usize]).collect();
         let here = self.measure(&faces, &interior);
         let nu = vec![0.0; tile.edges.len()];
         let mut outcome = Outcome { interior: None, nu, damping, gain: 0.0 };
-        if here.unsound + here.tilted == 0 && here.largest() <= self.goal {
+        if here.unsound + here.tilted == 0 && here.largest() <= goal {
             return outcome;
         }
         for _ in 0..ATTEMPTS {
