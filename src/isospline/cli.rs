@@ -13,6 +13,7 @@ pub(crate) mod interrupt;
 mod lint;
 pub(crate) mod output;
 mod progress;
+mod render;
 mod run;
 mod status;
 mod tables;
@@ -45,6 +46,7 @@ pub(crate) fn dispatch(args: &Cli, interrupt: &Interrupt) -> u8 {
         Command::Completions(args) => (habits::completions(args), false),
         Command::Man(args) => (habits::man(args), false),
         Command::Schema => (habits::schema(), false),
+        Command::Render(args) => (render::render(args), false),
     };
     outcome.unwrap_or_else(|failure| report(failure, json))
 }

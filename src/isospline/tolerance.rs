@@ -97,6 +97,8 @@ const FIRST_RATIO: f64 = 1.4;
 const ORDER: f64 = 3.0;
 /// Factor on the faces of an unsound surface.
 const SOUND_STEP: f64 = 1.6;
+/// Unsound surfaces after which more faces are not thought to help.
+const MOST_UNSOUND: usize = 6;
 /// Rounds of surfaces, and of curves.
 const MOST_SURFACES: usize = 8;
 const MOST_CURVES: usize = 9;
@@ -219,7 +221,10 @@ impl<'a> Search<'a> {
             }
             return if n_surfaces >= MOST_SURFACES { end(best, Verdict::Settled) } else { None };
         }
-        let is_over = n_surfaces >= MOST_SURFACES || (n_surfaces > 0 && self.is_stuck());
+        let n_unsound = self.rounds.iter().filter(|r| r.is_of_surface() && r.sound().is_none());
+        let is_over = n_surfaces >= MOST_SURFACES
+            || n_unsound.count() >= MOST_UNSOUND
+            || (n_surfaces > 0 && self.is_stuck());
         // Without a sound one the last: it has the most faces as a rule.
         let order = |r: &&Round| r.sound().unwrap_or(f64::INFINITY);
         let surfaces = self.rounds.iter().rev().filter(|r| r.is_of_surface());

@@ -35,6 +35,8 @@ use tiling::{Tile, Tiling};
 
 /// A visit that lowers a tile's squared distance by a smaller part than this lets it rest.
 const LITTLE_GAIN: f64 = 0.05;
+/// Steps that a tile takes however near it is.
+const FIRST_STEPS: u32 = 2;
 /// Sweeps that such a tile rests: plateaus come before the last factor ten, so it is not done.
 const REST: u32 = 3;
 /// Tiles visited between two looks at the stop signal: well under a second.
@@ -85,9 +87,7 @@ impl Stage for Relax {
         );
         let samples = Samples::new(self.params.grid);
         let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
-        let goal = self.params.goal * mesh.bounds[0].diagonal;
-        let (moves, samples, field) = (&moves, &samples, ctx.field);
-        let problem = Problem { mesh, network, moves, samples, field, goal };
+        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
         self.sweep(ctx, &problem, &tiling, &mut at)?;
         let mut counters = Counters::default();
         counters.count("tiles", tiling.tiles.len() as u64);
@@ -121,9 +121,14 @@ impl Relax {
         if let Some(kept) = ctx.host.kept().and_then(|bytes| at.decode(&bytes)) {
             *at = kept;
         }
+        let goal = self.params.goal * problem.mesh.bounds[0].diagonal;
         let all = std::iter::repeat_n(&tiling.colours, self.params.sweeps as usize).flatten();
         for colour in all.skip(at.colours as usize) {
-            visit(ctx, problem, &tiling.tiles, colour, of, at)?;
+            let awake = awake(colour, at);
+            for batch in awake.chunks(TILES_BETWEEN_STOPS) {
+                ctx.host.progress(at.colours, of)?;
+                visit(ctx, problem, &tiling.tiles, batch, goal, at);
+            }
             at.colours += 1;
             ctx.host.keep(at.colours, of, &|| at.encode());
         }
@@ -131,35 +136,40 @@ impl Relax {
     }
 }
 
-/// Visits the tiles of one colour that do not rest.
-fn visit(
-    ctx: &Ctx<'_>,
-    problem: &Problem<'_>,
-    tiles: &[Tile],
-    colour: &[usize],
-    of: u64,
-    at: &mut Progress,
-) -> Result<(), RelaxError> {
+/// The tiles of a colour that do not rest; the others have rested one sweep more.
+fn awake(colour: &[usize], at: &mut Progress) -> Vec<usize> {
     let (awake, resting): (Vec<usize>, Vec<usize>) =
         colour.iter().partition(|&&t| at.tiles[t].rest == 0);
     for t in resting {
         at.tiles[t].rest -= 1;
     }
-    for batch in awake.chunks(TILES_BETWEEN_STOPS) {
-        ctx.host.progress(at.colours, of)?;
-        let outcomes = map(ctx.host, batch.len(), |i| {
-            let t = batch[i];
-            problem.visit(&tiles[t], &at.interior, at.tiles[t].damping)
-        });
-        for (&t, outcome) in batch.iter().zip(outcomes) {
-            // Its neighbours may move what it shares with them: one that is near is looked at
-            // again too.
-            let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
-            at.tiles[t] = TileState { damping: outcome.damping, rest };
-            at.take(&tiles[t], outcome);
-        }
+    awake
+}
+
+/// Visits tiles of one colour; `goal` in model units.
+fn visit(
+    ctx: &Ctx<'_>,
+    problem: &Problem<'_>,
+    tiles: &[Tile],
+    batch: &[usize],
+    goal: f64,
+    at: &mut Progress,
+) {
+    let outcomes = map(ctx.host, batch.len(), |i| {
+        let (tile, state) = (&tiles[batch[i]], at.tiles[batch[i]]);
+        // Surfaces of the stages before may be folded where no sample sees it; the first steps
+        // unfold them.
+        let goal = if state.steps < FIRST_STEPS { 0.0 } else { goal };
+        problem.visit(tile, &at.interior, state.damping, goal)
+    });
+    for (&t, outcome) in batch.iter().zip(outcomes) {
+        // Its neighbours may move what it shares with them: one that is near is looked at again
+        // too.
+        let rest = if outcome.gain < LITTLE_GAIN { REST } else { 0 };
+        let steps = at.tiles[t].steps + u32::from(outcome.interior.is_some());
+        at.tiles[t] = TileState { damping: outcome.damping, rest, steps };
+        at.take(&tiles[t], outcome);
     }
-    Ok(())
 }
 
 fn interior(row: &[f64; 45]) -> Interior {

@@ -28,17 +28,21 @@ pub(crate) struct TileState {
     pub(crate) damping: f64,
     /// Sweeps that it sits out.
     pub(crate) rest: u32,
+    /// Steps taken.
+    pub(crate) steps: u32,
 }
 
 /// Words of 8 bytes before the tiles.
 const COUNTS: usize = 3;
+/// Words of a tile.
+const TILE: usize = 3;
 /// Words of the interior of a face.
 const INTERIOR: usize = 45;
 
 impl Progress {
     /// No colour visited yet.
     pub(crate) fn new(interior: Vec<Interior>, nu: Vec<f64>, n_tiles: usize) -> Self {
-        let tiles = vec![TileState { damping: FIRST_DAMPING, rest: 0 }; n_tiles];
+        let tiles = vec![TileState { damping: FIRST_DAMPING, rest: 0, steps: 0 }; n_tiles];
         Self { colours: 0, visits: 0, idle_visits: 0, tiles, nu, interior }
     }
 
@@ -54,10 +58,11 @@ impl Progress {
         }
     }
 
-    /// Little-endian words: counts, damping and rest of each tile, `nu`, interiors.
+    /// Little-endian words: counts, damping, rest and steps of each tile, `nu`, interiors.
     pub(crate) fn encode(&self) -> Vec<u8> {
         let counts = [self.colours, self.visits, self.idle_visits];
-        let tiles = self.tiles.iter().flat_map(|t| [t.damping.to_bits(), u64::from(t.rest)]);
+        let words = |t: &TileState| [t.damping.to_bits(), t.rest.into(), t.steps.into()];
+        let tiles = self.tiles.iter().flat_map(words);
         let points = self.interior.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
         let reals = self.nu.iter().copied().chain(points).map(f64::to_bits);
         counts.into_iter().chain(tiles).chain(reals).flat_map(u64::to_le_bytes).collect()
@@ -69,14 +74,15 @@ impl Progress {
         let (words, []) = bytes.as_chunks::<8>() else { return None };
         let words: Vec<u64> = words.iter().map(|w| u64::from_le_bytes(*w)).collect();
         let (counts, rest) = words.split_at_checked(COUNTS)?;
-        let (tiles, rest) = rest.split_at_checked(2 * self.tiles.len())?;
+        let (tiles, rest) = rest.split_at_checked(TILE * self.tiles.len())?;
         let (nu, points) = rest.split_at_checked(self.nu.len())?;
         if points.len() != INTERIOR * self.interior.len() {
             return None;
         }
         let real = |&word: &u64| f64::from_bits(word);
-        let tile = |pair: &[u64; 2]| {
-            Some(TileState { damping: real(&pair[0]), rest: u32::try_from(pair[1]).ok()? })
+        let tile = |[damping, rest, steps]: &[u64; TILE]| {
+            let [rest, steps] = [rest, steps].map(|&n| u32::try_from(n).ok());
+            Some(TileState { damping: real(damping), rest: rest?, steps: steps? })
         };
         let interior = |face: &[u64; INTERIOR]| -> Interior {
             std::array::from_fn(|i| {
@@ -101,7 +107,7 @@ mod tests {
     fn progress(n_tiles: usize) -> Progress {
         let interior = |f: usize| std::array::from_fn(|i| Vec3::new(f as f64, i as f64, -0.1));
         let mut progress = Progress::new((0..4).map(interior).collect(), vec![0.25; 6], n_tiles);
-        progress.tiles[1] = TileState { damping: 1e-9, rest: 2 };
+        progress.tiles[1] = TileState { damping: 1e-9, rest: 2, steps: 1 };
         Progress { colours: 5, visits: 9, idle_visits: 1, ..progress }
     }
 

@@ -40,8 +40,6 @@ pub(crate) struct Problem<'a> {
     pub(crate) moves: &'a Moves,
     pub(crate) samples: &'a Samples,
     pub(crate) field: &'a dyn Field,
-    /// Distance that is near enough, in model units.
-    pub(crate) goal: f64,
 }
 
 /// What a visit leaves behind.
@@ -59,14 +57,20 @@ pub(crate) struct Outcome {
 
 impl Problem<'_> {
     /// One step that lowers the squared distance of the tile's samples, or mends its folds, if one
-    /// of a few does.
-    pub(crate) fn visit(&self, tile: &Tile, surface: &[Interior], damping: f64) -> Outcome {
+    /// of a few does; none if all are within `goal`, in model units.
+    pub(crate) fn visit(
+        &self,
+        tile: &Tile,
+        surface: &[Interior],
+        damping: f64,
+        goal: f64,
+    ) -> Outcome {
         let interior: Vec<Interior> = tile.faces.iter().map(|&f| surface[f as usize]).collect();
         let faces = self.faces(tile);
         let here = self.measure(&faces, &interior);
         let nu = vec![0.0; tile.edges.len()];
         let idle = Outcome { interior: None, nu, damping, gain: 0.0 };
-        if here.unsound + here.tilted == 0 && here.largest() <= self.goal {
+        if here.unsound + here.tilted == 0 && here.largest() <= goal {
             return idle;
         }
         let visit =
@@ -279,7 +283,8 @@ impl Measured {
     fn of(jets: &[Jet1]) -> Self {
         let n = jets.len();
         let (distance, normal) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let mut out = Self { distance, normal, sum_sq: 0.0, folds: Vec::new(), unsound: 0, tilted: 0 };
+        let mut out =
+            Self { distance, normal, sum_sq: 0.0, folds: Vec::new(), unsound: 0, tilted: 0 };
         for jet in jets {
             let slope = jet.gradient.norm();
             let distance = jet.value / slope;

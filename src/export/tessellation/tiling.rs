@@ -148,19 +148,38 @@ impl Tiling {
             let shifted = grid_triangles(side).map(|t| t.map(|q| first + q as u32));
             self.triangles.extend(shifted);
         }
+        let inner = |corner: usize, step: usize| {
+            let mut e = [0; 3];
+            e[corner] = side - step;
+            e[(corner + 1) % 3] = step;
+            first + index(e) as u32
+        };
+        let is_cut = [0, 1, 2].map(|corner| self.cut(corner, rows, inner(corner, 0), level));
         for (corner, outer) in rows.iter().enumerate() {
-            let inner: Vec<u32> = (0..=side)
-                .map(|step| {
-                    let mut e = [0; 3];
-                    e[corner] = side - step;
-                    e[(corner + 1) % 3] = step;
-                    first + index(e) as u32
-                })
-                .collect();
             let n = outer.len() - 1;
+            let start = usize::from(is_cut[corner]);
+            let outer = &outer[start..=n - usize::from(is_cut[(corner + 1) % 3])];
+            let inner: Vec<u32> = (0..=side).map(|step| inner(corner, step)).collect();
             // Along the edge, an inner point of step t stands at (t + 3/2) / level.
-            self.zip([outer, &inner], |s, t| is_before((2 * s + 1, 2 * n), (t + 2, level)));
+            self.zip([outer, &inner], |s, t| {
+                is_before((2 * (s + start) + 1, 2 * n), (t + 2, level))
+            });
         }
+    }
+
+    /// Cuts a corner off as the regular grid does, where both of its edges have points inside:
+    /// an edge from the corner inward would be the longest of all.
+    fn cut(&mut self, corner: usize, rows: &[Vec<u32>; 3], inner: u32, level: usize) -> bool {
+        let (after, before) = (&rows[corner], &rows[(corner + 2) % 3]);
+        // The cut passes the innermost point where the two numbers of segments make the level;
+        // there should be room for a triangle between them.
+        let is_clear = 2 * (after.len() + before.len() - 2) >= 3 * level;
+        if after.len() == 2 || before.len() == 2 || !is_clear {
+            return false;
+        }
+        let (next, last) = (after[1], before[before.len() - 2]);
+        self.triangles.extend([[after[0], next, last], [next, inner, last]]);
+        true
     }
 
     /// Triangles between two rows of points, the first on the right hand going along; the first

@@ -5,6 +5,7 @@ use crate::cli::habits::{
     COMPLETIONS_EXAMPLES, CompletionsArgs, MAN_EXAMPLES, ManArgs, SCHEMA_EXAMPLES,
 };
 use crate::cli::lint::{LINT_EXAMPLES, LintArgs};
+use crate::cli::render::{RENDER_EXAMPLES, RenderArgs};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -91,6 +92,9 @@ pub(crate) enum Command {
     /// Print the JSON Schema of model files, for editors
     #[command(after_help = SCHEMA_EXAMPLES)]
     Schema,
+    /// Draw a surface as a PNG picture
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(RenderArgs),
 }
 
 const RUN_EXAMPLES: &str = "\

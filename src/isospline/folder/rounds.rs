@@ -30,7 +30,7 @@ const TOO_FEW: [&str; 6] = [
 ];
 
 /// Part of the tolerance from which patches are not brought nearer: the worst patch decides.
-pub(crate) const RELAX_TO: f64 = 0.3;
+pub(crate) const RELAX_TO: f64 = 0.1;
 
 /// The last stage of a round of curves, and the largest error that it counts.
 const CURVES_STAGE: &str = "network";
