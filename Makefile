@@ -7,6 +7,9 @@ TARGET := $(or $(CARGO_TARGET_DIR),target)
 ISOSPLINE := $(TARGET)/release/isospline
 # The models of [TK] Fig. 9-15, in its order.
 PAPER := torus_regular torus dodecahedron double_torus mcmullen chair deccube
+# One view for pictures that stand side by side.
+DRAW_CUBE = $(ISOSPLINE) render out/deccube --size 620x560 --view 58,27
+DRAW_STRIPES = $(ISOSPLINE) render out/pictures/dodecahedron --size 560x520 --view -50,40 --stripes 18
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -50,9 +53,17 @@ reliability: ## try what may happen to a run and print the scoreboard (all of it
 golden: ## rewrite tests/golden; read the diff
 	ISOSPLINE_GOLDEN=rewrite $(CARGO) test -p isospline-tests --test golden
 
-pictures: deccube readers ## draw docs/pictures from the exported patches (needs Python)
-	$(ISOSPLINE) export out/deccube --format npz
-	.venv/bin/python docs/pictures/draw.py out/deccube/deccube.npz docs/pictures/deccube.png
+pictures: deccube ## draw docs/pictures
+	$(ISOSPLINE) run configs/dodecahedron.toml --out out/pictures/dodecahedron \
+		--set target.faces=320 --set target.fit=paper
+	$(DRAW_CUBE) --stage adapt --style patches -o docs/pictures/deccube_mesh.png
+	$(DRAW_CUBE) --style zebra -o docs/pictures/deccube_zebra.png
+	$(DRAW_CUBE) --style curvature -o docs/pictures/deccube_curvature.png
+	$(DRAW_CUBE) --style gold -o docs/pictures/deccube_gold.png
+	$(DRAW_CUBE) --style error -o docs/pictures/deccube_error.png
+	$(DRAW_CUBE) --style gaussian -o docs/pictures/deccube_gaussian.png
+	$(DRAW_STRIPES) --stage g0_fit -o docs/pictures/dodecahedron_g0.png
+	$(DRAW_STRIPES) --stage fairing -o docs/pictures/dodecahedron_g1.png
 
 docs: ## build the API documentation, target/doc/isospline/index.html
 	$(CARGO) doc --workspace --no-deps -q
