@@ -299,7 +299,7 @@ fn curves_in_parameters_that_are_another_side_are_found() {
         ("a line run backwards", "Pcurve", |s| {
             let pcurve = s.number("PCURVE", 4);
             let (line, first) = (s.named(pcurve)[1], s.number("DEFINITIONAL_REPRESENTATION", 0));
-            let back = first + ((line - first) / 5 ^ 1) * 5;
+            let back = first + (((line - first) / 5) ^ 1) * 5;
             s.edit(pcurve, |text| text.replacen(&format!("#{line}"), &format!("#{back}"), 1))
         }),
         ("a face that the edge does not bound", "Pcurve", |s| {
