@@ -1,6 +1,6 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench reliability golden pictures docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench library-bench cluster reliability golden pictures docs clean
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
@@ -46,6 +46,15 @@ bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50
 	$(CARGO) bench --workspace
 	$(CARGO) run --release -q -p isospline --example stage_times
 	$(CARGO) run --release -q -p isospline --example overlap
+
+library-bench: build ## convert 1000 models in a batch that is killed in the middle; models a second
+	rm -rf out/library-bench
+	bash tests/cluster/library.sh $(ISOSPLINE) out/library-bench
+
+cluster: build ## run emitted scripts on Slurm (as root) and snakemake, where they are installed
+	rm -rf out/cluster
+	bash tests/cluster/slurm.sh $(ISOSPLINE) out/cluster/slurm
+	bash tests/cluster/snakemake.sh $(ISOSPLINE) out/cluster/snakemake
 
 reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
 	$(CARGO) run --release -q -p isospline-tests --bin scoreboard

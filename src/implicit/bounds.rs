@@ -22,6 +22,10 @@ const MAX_CELLS: usize = 60_000;
 /// if none differ in sign. Without them the border of a field's domain would count as surface.
 const UNDEFINED_DEPTHS: [u32; 2] = [6, 18];
 
+/// Depth of a cell at the limit from which on it counts as one where f comes to zero, if no sample
+/// differs in sign and the enclosure is bounded: about 1e-5 of the search cube a side.
+const TOUCHING_DEPTH: u32 = 51;
+
 /// Points a side of the first grid of samples, 0.1 ms for deccube: where it meets the set, the
 /// search knows from the start how exact it has to be.
 const SEED_SAMPLES: usize = 24;
@@ -53,7 +57,7 @@ pub enum BoundsError {
         high: f64,
     },
     /// `x^2 + y^2 + z^2`
-    #[error("f does not change sign: it lies between {low} and {high}, nearest to zero by [{}, {}, {}]", near[0], near[1], near[2])]
+    #[error("f does not change sign: it lies between {low} and {high}, nearest to zero by ({}, {}, {})", near[0], near[1], near[2])]
     NoChangeOfSign {
         /// Smallest value seen.
         low: f64,
@@ -67,6 +71,16 @@ pub enum BoundsError {
     Undefined {
         /// Half side of the cube searched.
         limit: f64,
+    },
+    /// `max(x^2 + y^2 + z^2 - 1, min(0, z - 2))`
+    #[error("f comes to zero without changing its sign as far as the limit {limit} at {side}, near ({}, {}, {}): no box is sure to hold the surface", near[0], near[1], near[2])]
+    TouchesLimit {
+        /// Where.
+        side: Side,
+        /// Half side of the cube searched.
+        limit: f64,
+        /// A point there.
+        near: [f64; 3],
     },
     /// `x^2 + y^2 - 1`
     #[error("the surface reaches the limit {limit} at {side}")]
@@ -105,7 +119,7 @@ pub fn auto_box(field: &dyn Field, limit: f64) -> Result<Aabb, BoundsError> {
     let mut search = Search::new(field, whole);
     search.seed(&whole.aabb);
     for side in Side::ALL {
-        search.settle(side)?;
+        search.settle(side, limit)?;
     }
     search.finish(limit)
 }
@@ -209,13 +223,17 @@ impl<'a> Search<'a> {
     }
 
     /// Splits cells until none reaches much farther to `side` than the zeros found.
-    fn settle(&mut self, side: Side) -> Result<(), BoundsError> {
+    fn settle(&mut self, side: Side, limit: f64) -> Result<(), BoundsError> {
         let rank = |cell: Cell| Ranked { reach: side.reach(&cell.aabb), cell };
         let mut heap: BinaryHeap<Ranked> = self.cells.drain(..).map(rank).collect();
         while let Some(farthest) = heap.pop() {
             if farthest.reach <= self.goal(side) || self.n_seen >= MAX_CELLS {
                 heap.push(farthest);
                 break;
+            }
+            if farthest.reach >= limit && farthest.cell.depth >= TOUCHING_DEPTH {
+                let near = farthest.cell.aabb.center().into();
+                return Err(BoundsError::TouchesLimit { side, limit, near });
             }
             for mut cell in farthest.cell.halves() {
                 if self.may_hold_zero(&mut cell, side)? {
