@@ -49,7 +49,8 @@ pub(crate) fn near(
         }
     }
     // Across a thin sheet f varies so much that all else looks flat; but there the steps go on.
-    let flat = found.filter(|flat| (flat.at - at).norm() <= NEAR * cell)?;
+    // Where all values underflow to zero any point will do.
+    let flat = found.filter(|flat| scale <= 0.0 || (flat.at - at).norm() <= NEAR * cell)?;
     Some(flat.told(field, cell))
 }
 
@@ -77,7 +78,8 @@ impl Flat {
     fn rounded(&self, field: &dyn Field, axis: usize, decimals: i32) -> Option<Self> {
         let unit = libm::pow(10.0, f64::from(decimals));
         let mut at = self.at;
-        at[axis] = (at[axis] * unit).round() / unit;
+        // Minus nothing is told as nothing.
+        at[axis] = (at[axis] * unit).round() / unit + 0.0;
         let jet = field.gradient(at);
         let (value, slope) = (jet.value, jet.gradient.norm());
         (slope <= self.slope && value.abs() <= self.value.abs()).then_some(Self {

@@ -15,7 +15,7 @@ PATH=$PATH:/usr/sbin
 mkdir -p library run
 printf '[model]\nformula = "x^2+y^2+z^2-1"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n' > library/ball.toml
 printf '[model]\nformula = "x^2+y^2-z^2*(1-z^2)"\nbox = [[-1.5,1.5],[-1.5,1.5],[-1.5,1.5]]\n' > library/cone.toml
-printf '[model]\nformula = "(sqrt(x^2+y^2)-1)^2+z^2-0.1"\nbox = [[-1.5,1.5],[-1.5,1.5],[-0.5,0.5]]\n[target]\nfaces = 20000\n' > library/large.toml
+printf '[model]\nformula = "(sqrt(x^2+y^2)-1)^2+z^2-0.1"\nbox = [[-1.5,1.5],[-1.5,1.5],[-0.5,0.5]]\n[target]\nfaces = 20000\n' > library/a_large.toml
 set_all=(--set target.fit=paper)
 
 host=$(hostname -s)
@@ -54,10 +54,9 @@ for ((i = 0; i < 50; i++)); do sinfo -h -o %t 2>/dev/null | grep -q idle && brea
 
 "$isospline" batch library --out out "${set_all[@]}" --emit slurm
 job=$(sbatch --parsable out/batch.slurm)
-for ((i = 0; i < 100; i++)); do [ "$(squeue -h -t R -j "$job" | wc -l)" -gt 0 ] && break; sleep 0.1; done
-sleep 0.5
-# The task of the large model, wherever it is: what it has begun is gone on with.
-scontrol requeue "${job}_2" && echo "requeued ${job}_2" || echo "task 2 has ended before it could be requeued"
+# The large model is the first. What it has begun when it is requeued is gone on with.
+for ((i = 0; i < 300; i++)); do [ -e out/a_large/01-polygonize.isos ] && break; sleep 0.1; done
+if scontrol requeue "${job}_0"; then echo "requeued in the middle"; else echo "the first task had ended before it could be requeued"; fi
 for ((i = 0; i < 1800; i++)); do [ -z "$(squeue -h -j "$job" 2>/dev/null)" ] && break; sleep 0.5; done
 echo "tasks: $(scontrol show job "$job" | grep -c JobState=COMPLETED) completed"
 
@@ -67,5 +66,5 @@ code=0
 "$isospline" batch library --out plain "${set_all[@]}" --json > /dev/null 2>&1 || true
 outcomes() { sed 's/.*"model":"\([^"]*\)","outcome":"\([^"]*\)","reason":"\([^"]*\)".*/\1 \2 \3/' "$1/summary.jsonl" | sort; }
 diff <(outcomes out) <(outcomes plain)
-cmp out/large/11-fairing.isos plain/large/11-fairing.isos
+cmp out/a_large/11-fairing.isos plain/a_large/11-fairing.isos
 echo "the array of Slurm did what the batch does"
