@@ -151,12 +151,23 @@ fn every_format_is_written_where_it_is_asked_for() {
         sandbox.succeeds(&["export", "out", "--format", format]);
         let default = std::fs::read(sandbox.path(&format!("out/torus.{format}"))).unwrap();
         let file = format!("elsewhere.{format}");
-        sandbox.succeeds(&["export", "out", "--format", format, "-o", &file, "--tolerance", "1e-4"]);
+        sandbox.succeeds(&[
+            "export",
+            "out",
+            "--format",
+            format,
+            "-o",
+            &file,
+            "--tolerance",
+            "1e-4",
+        ]);
         assert!(std::fs::read(sandbox.path(&file)).unwrap() == default, "{format}");
     }
     let lost = sandbox.isospline(&["export", "out", "--format", "stl", "-o", "no/such/a.stl"]);
     assert_eq!(lost.code, 33, "{}", lost.stderr);
-    for (option, value, code) in [("--tolerance", "0", 2), ("--chord", "-1", 2), ("--order", "8", 2)] {
+    for (option, value, code) in
+        [("--tolerance", "0", 2), ("--chord", "-1", 2), ("--order", "8", 2)]
+    {
         let option = format!("{option}={value}");
         let refused = sandbox.isospline(&["export", "out", "--format", "stl", &option]);
         assert_eq!(refused.code, code, "{option}: {}", refused.stderr);
@@ -239,7 +250,8 @@ fn a_reader_that_goes_away_is_no_panic() {
 #[test]
 fn completions_and_manual_pages_name_every_command() {
     let sandbox = Sandbox::new();
-    let commands = ["run", "stage", "status", "inspect", "check", "export", "lint", "man", "schema"];
+    let commands =
+        ["run", "stage", "status", "inspect", "check", "export", "lint", "man", "schema"];
     for shell in ["bash", "zsh", "fish"] {
         let script = sandbox.succeeds(&["completions", shell]).stdout;
         for word in commands.iter().chain(&["--tolerance", "--format"]) {
@@ -247,7 +259,10 @@ fn completions_and_manual_pages_name_every_command() {
         }
     }
     let page = sandbox.succeeds(&["man"]).stdout;
-    assert!(page.contains(".TH isospline") && page.contains("the model file has a bad key"), "{page}");
+    assert!(
+        page.contains(".TH isospline") && page.contains("the model file has a bad key"),
+        "{page}"
+    );
     let page = sandbox.succeeds(&["man", "export"]).stdout;
     assert!(page.contains("isospline export") && page.contains("tolerance"), "{page}");
     assert_eq!(sandbox.isospline(&["man", "nothing"]).code, 2);
@@ -263,14 +278,28 @@ fn nothing_is_coloured_where_colour_is_not_wanted() {
     let sandbox = Sandbox::new();
     for args in [&["--help"][..], &["run", "nothing.toml"], &["export", "x", "--format", "zzz"]] {
         let outcome = sandbox.isospline(args);
-        assert!(!outcome.stdout.contains('\u{1b}') && !outcome.stderr.contains('\u{1b}'), "{args:?}");
+        assert!(
+            !outcome.stdout.contains('\u{1b}') && !outcome.stderr.contains('\u{1b}'),
+            "{args:?}"
+        );
     }
 }
 
 #[test]
 fn help_has_examples_and_the_exit_codes_of_the_readme() {
     let sandbox = Sandbox::new();
-    for command in ["run", "stage", "status", "inspect", "check", "export", "lint", "completions", "man", "schema"] {
+    for command in [
+        "run",
+        "stage",
+        "status",
+        "inspect",
+        "check",
+        "export",
+        "lint",
+        "completions",
+        "man",
+        "schema",
+    ] {
         let help = sandbox.succeeds(&[command, "--help"]).stdout;
         assert!(help.contains(&format!("isospline {command} ")), "{help}");
         assert!(help.contains("Example"), "{help}");

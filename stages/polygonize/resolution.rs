@@ -33,6 +33,9 @@ const MOST_GROWTH: f64 = 4.0;
 /// The box is cropped to the surface where that takes away this share of its longest side:
 /// otherwise a sphere in a box a million times its size would need as many cells.
 const CROP: f64 = 0.25;
+/// Size of the box, of that given, below which it is not cropped further: it closes in on a point
+/// where f touches zero, and squares of smaller numbers vanish.
+const POINT: f64 = 1e-60;
 
 /// A grid with what it shows.
 #[derive(Clone, Debug)]
@@ -203,7 +206,8 @@ fn crop(ctx: &Ctx<'_>, params: &PolygonizeParams, levels: u32) -> Result<Aabb, P
         let hi = fold(&cells, u32::max).map(|c| c + 1);
         let hull = grid.cell_box(lo, hi);
         let shrinks = hull.size().max() <= (1.0 - CROP) * domain.size().max();
-        if !shrinks || !hull.size().iter().all(|&s| s > 0.0) {
+        let is_point = hull.size().max() < POINT * ctx.domain.size().max();
+        if !shrinks || is_point || !hull.size().iter().all(|&s| s > 0.0) {
             return Ok(domain);
         }
         domain = hull;

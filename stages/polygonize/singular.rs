@@ -49,8 +49,7 @@ pub(crate) fn near(
         }
     }
     // Across a thin sheet f varies so much that all else looks flat; but there the steps go on.
-    // Where all values underflow to zero any point will do.
-    let flat = found.filter(|flat| scale <= 0.0 || (flat.at - at).norm() <= NEAR * cell)?;
+    let flat = found.filter(|flat| (flat.at - at).norm() <= NEAR * cell)?;
     Some(flat.told(field, cell))
 }
 

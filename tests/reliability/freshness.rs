@@ -23,11 +23,8 @@ const WORDS: [(&str, &[&str]); 8] = [
 
 /// Keys that `configs/reference.toml` has as comments, for they have no default, and one that
 /// only a model can have. A tolerance, which makes rounds of runs, has tests of its own.
-const WITHOUT_DEFAULT: [(&str, &str); 3] = [
-    ("model.unit", "mm"),
-    ("model.parameters.r", "1.01"),
-    ("check.error", "0.01"),
-];
+const WITHOUT_DEFAULT: [(&str, &str); 3] =
+    [("model.unit", "mm"), ("model.parameters.r", "1.01"), ("check.error", "0.01")];
 
 /// Stages that a key of `[model]` or `[target]` goes to; of a stage's own table, that stage.
 const OWNERS: [(&str, &[&str]); 6] = [
