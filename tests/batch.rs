@@ -22,8 +22,11 @@ fn library() -> Sandbox {
     std::fs::create_dir_all(sandbox.path("library/curved")).unwrap();
     sandbox.write("library/ball.toml", model(SPHERE));
     sandbox.write("library/curved/cone.toml", model("x^2 + y^2 - z^2*(1 - z^2)"));
-    sandbox.write("library/curved/ball.vm", "x var-x\ny var-y\nz var-z\na square x\nb square y\n\
-        c square z\nd add a b\ne add d c\nr const 1\nf sub e r\n");
+    sandbox.write(
+        "library/curved/ball.vm",
+        "x var-x\ny var-y\nz var-z\na square x\nb square y\n\
+        c square z\nd add a b\ne add d c\nr const 1\nf sub e r\n",
+    );
     sandbox.write("library/bad, \"quoted\".toml", "[model]\nformula = \"x +\"\n");
     sandbox.write("library/notes.txt", "no model");
     sandbox

@@ -4,7 +4,7 @@ use crate::inside::Side;
 use crate::{Field, Interval};
 use isospline_geometry::{Aabb, Vec3};
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, VecDeque};
 use thiserror::Error;
 
 /// Free space beside the zero set on each side, as a part of the box: the models of MATH.md have
@@ -118,10 +118,15 @@ pub fn auto_box(field: &dyn Field, limit: f64) -> Result<Aabb, BoundsError> {
     let whole = Cell { aabb: Aabb::new(-corner, corner), depth: 0, axis: 0 };
     let mut search = Search::new(field, whole);
     search.seed(&whole.aabb);
-    for side in Side::ALL {
-        search.settle(side, limit)?;
+    match search.settled(limit) {
+        Err(BoundsError::NoChangeOfSign { .. }) => {}
+        found => return found,
     }
-    search.finish(limit)
+    // Where f is zero at a corner of all cells around it, as `(x-1)^2 + y^2 + z^2 - 1` is at the
+    // origin, the cells that reach farthest lead there and nowhere else: look everywhere alike.
+    let mut search = Search::new(field, whole);
+    search.spread()?;
+    search.settled(limit)
 }
 
 /// A part of the search cube that may hold a zero.
@@ -220,6 +225,29 @@ impl<'a> Search<'a> {
                 }
             }
         }
+    }
+
+    /// Settles all sides.
+    fn settled(&mut self, limit: f64) -> Result<Aabb, BoundsError> {
+        for side in Side::ALL {
+            self.settle(side, limit)?;
+        }
+        self.finish(limit)
+    }
+
+    /// Splits all cells alike until a change of sign is found, with half of the work at most.
+    fn spread(&mut self) -> Result<(), BoundsError> {
+        let mut cells: VecDeque<Cell> = self.cells.drain(..).collect();
+        while self.proven.min.x > self.proven.max.x && self.n_seen < MAX_CELLS / 2 {
+            let Some(largest) = cells.pop_front() else { break };
+            for mut cell in largest.halves() {
+                if self.may_hold_zero(&mut cell, Side::XMin)? {
+                    cells.push_back(cell);
+                }
+            }
+        }
+        self.cells = cells.into();
+        Ok(())
     }
 
     /// Splits cells until none reaches much farther to `side` than the zeros found.
@@ -418,6 +446,22 @@ mod tests {
             6.0,
             [4.9014, 4.9014, 4.9336],
         );
+    }
+
+    #[test]
+    fn a_surface_that_touches_the_planes_of_bisection_is_found() {
+        for text in ["(x-1)^2+y^2+z^2-1", "x^2+(y+2)^2+z^2-4", "(x-1)^2+(y-1)^2+(z-1)^2-1"] {
+            let found = find(text, 1000.0).unwrap();
+            let size = found.size().max();
+            assert!((2.0..10.0).contains(&size), "{text}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_field_that_touches_zero_as_far_as_the_limit_is_told_with_a_place() {
+        let error = find("min(x^2+y^2+z^2-1, max(abs(y-3)+abs(z), 0))", 1000.0).unwrap_err();
+        let BoundsError::TouchesLimit { near, .. } = error else { panic!("{error}") };
+        assert!((near[1] - 3.0).abs() < 0.1 && near[2].abs() < 0.1, "{near:?}");
     }
 
     #[test]

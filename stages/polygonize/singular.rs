@@ -63,12 +63,11 @@ struct Flat {
 impl Flat {
     fn told(mut self, field: &dyn Field, cell: f64) -> PolygonizeError {
         let decimals = -libm::floor(libm::log10(cell)) as i32;
+        let finer = decimals..decimals + MOST_ROUNDINGS;
         for axis in 0..3 {
-            let finer = decimals..decimals + MOST_ROUNDINGS;
-            let Some(rounded) = finer.filter_map(|k| self.rounded(field, axis, k)).next() else {
-                continue;
-            };
-            self = rounded;
+            if let Some(rounded) = finer.clone().find_map(|k| self.rounded(field, axis, k)) {
+                self = rounded;
+            }
         }
         PolygonizeError::SingularPoint { at: self.at, value: self.value, slope: self.slope }
     }
