@@ -1,12 +1,15 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench reliability golden pictures docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench library-bench cluster reliability golden pictures docs clean
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ISOSPLINE := $(TARGET)/release/isospline
 # The models of [TK] Fig. 9-15, in its order.
 PAPER := torus_regular torus dodecahedron double_torus mcmullen chair deccube
+# One view for pictures that stand side by side.
+DRAW_CUBE = $(ISOSPLINE) render out/deccube --size 620x560 --view 58,27
+DRAW_STRIPES = $(ISOSPLINE) render out/pictures/dodecahedron --size 560x520 --view -50,40 --stripes 18
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -44,15 +47,32 @@ bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50
 	$(CARGO) run --release -q -p isospline --example stage_times
 	$(CARGO) run --release -q -p isospline --example overlap
 
+library-bench: build ## convert 1000 models in a batch that is killed in the middle; models a second
+	rm -rf out/library-bench
+	bash tests/cluster/library.sh $(ISOSPLINE) out/library-bench
+
+cluster: build ## run emitted scripts on Slurm (as root) and snakemake, where they are installed
+	rm -rf out/cluster
+	bash tests/cluster/slurm.sh $(ISOSPLINE) out/cluster/slurm
+	bash tests/cluster/snakemake.sh $(ISOSPLINE) out/cluster/snakemake
+
 reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
 	$(CARGO) run --release -q -p isospline-tests --bin scoreboard
 
 golden: ## rewrite tests/golden; read the diff
 	ISOSPLINE_GOLDEN=rewrite $(CARGO) test -p isospline-tests --test golden
 
-pictures: deccube readers ## draw docs/pictures from the exported patches (needs Python)
-	$(ISOSPLINE) export out/deccube --format npz
-	.venv/bin/python docs/pictures/draw.py out/deccube/deccube.npz docs/pictures/deccube.png
+pictures: deccube ## draw docs/pictures
+	$(ISOSPLINE) run configs/dodecahedron.toml --out out/pictures/dodecahedron \
+		--set target.faces=320 --set target.fit=paper
+	$(DRAW_CUBE) --stage adapt --style patches -o docs/pictures/deccube_mesh.png
+	$(DRAW_CUBE) --style zebra -o docs/pictures/deccube_zebra.png
+	$(DRAW_CUBE) --style curvature -o docs/pictures/deccube_curvature.png
+	$(DRAW_CUBE) --style gold -o docs/pictures/deccube_gold.png
+	$(DRAW_CUBE) --style error -o docs/pictures/deccube_error.png
+	$(DRAW_CUBE) --style gaussian -o docs/pictures/deccube_gaussian.png
+	$(DRAW_STRIPES) --stage g0_fit -o docs/pictures/dodecahedron_g0.png
+	$(DRAW_STRIPES) --stage fairing -o docs/pictures/dodecahedron_g1.png
 
 docs: ## build the API documentation, target/doc/isospline/index.html
 	$(CARGO) doc --workspace --no-deps -q

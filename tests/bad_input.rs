@@ -52,7 +52,51 @@ fn fields_that_have_no_surface() {
             exit: 22,
             says: &["singular-point", "the surface is singular at"],
         },
-        Case { text: model("x^2 + y^2 - 1"), exit: 23, says: &["leaves-box", "through z-"] },
+        Case {
+            text: model("x^2 + y^2 - 1 + 0.1*z"),
+            exit: 23,
+            says: &["leaves-box", "through z- and z+, at (", "16 times as large", "smax"],
+        },
+        Case {
+            text: model("(x - 1.2)^2 + y^2 + z^2 - 1"),
+            exit: 23,
+            says: &["leaves-box", "through x+", "all of it lies in [[0.", "model.box"],
+        },
+        Case {
+            text: model("x^2 + y^2 - 1"),
+            exit: 27,
+            says: &["two-dimensional", "does not depend on z", "smax(f"],
+        },
+        Case {
+            text: "[model]\nformula = \"max(x, y)^2 + x^2 - 0.5\"\n",
+            exit: 27,
+            says: &["two-dimensional", "does not depend on z"],
+        },
+        Case {
+            text: model("max(x^2 + y^2 + z^2 - 1, z - 0.5)"),
+            exit: 28,
+            says: &["sharp-edge", "60.0 degrees at (", "0.5), made by max", "smax(a, b, k)"],
+        },
+        Case {
+            text: model("(x^2 + y^2 + z^2 - 1)^2"),
+            exit: 29,
+            says: &["no-sign-change", "touches zero near ("],
+        },
+        Case {
+            text: "[model]\nformula = \"(x^2 + y^2 + z^2 - 1)^2\"\n",
+            exit: 29,
+            says: &["no-sign-change", "nearest to zero by ("],
+        },
+        Case {
+            text: model("(x^2 + y^2 + z^2 - 1)^3"),
+            exit: 22,
+            says: &["level-not-regular", "vanishes all over the surface"],
+        },
+        Case {
+            text: model("(x^2 + y^2 + z^2)^2 - (x^2 + y^2)"),
+            exit: 22,
+            says: &["singular-point", "singular at (0, 0, 0):"],
+        },
     ]);
 }
 
@@ -148,7 +192,10 @@ fn a_stage_that_fails_tells_where() {
     let last: serde_json::Value =
         serde_json::from_str(outcome.stdout.lines().last().unwrap()).unwrap();
     let place: Vec<f64> = serde_json::from_value(last["place"].clone()).unwrap();
-    let told = format!("({}, {}, {})", place[0], place[1], place[2]);
+    // Six digits are told.
+    let six_digits = |x: f64| format!("{x:.5e}").parse::<f64>().unwrap();
+    let [x, y, z] = [place[0], place[1], place[2]].map(six_digits);
+    let told = format!("({x}, {y}, {z})");
     assert!(last["message"].as_str().unwrap().contains(&told), "{last}");
 }
 

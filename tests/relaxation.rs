@@ -29,6 +29,26 @@ fn relaxation_lowers_the_error_a_thousandfold_and_keeps_surfaces_exact() {
     }
 }
 
+/// Largest distance of a curve of `config` from the surface, relative.
+fn curve_error(config: &str) -> f64 {
+    let sandbox = Sandbox::new();
+    // Unrelaxed patches pass no check, which does not matter here.
+    let limits = ["--set", "relax.sweeps=0", "--set", "check.error=1"];
+    sandbox.converts(config, &[&["--set", "target.fit=full"], &limits[..]].concat());
+    let record = std::fs::read(sandbox.path("out/07-network.json")).expect("a record");
+    let record: serde_json::Value = serde_json::from_slice(&record).expect("a record is JSON");
+    number(&record["counters"]["maxima"], "curve_distance_max_rel")
+}
+
+#[test]
+fn curves_on_spheres_converge_with_an_order_above_seven() {
+    let errors = ["sphere_80", "sphere_320", "sphere_1280"].map(curve_error);
+    for pair in errors.windows(2) {
+        let order = (pair[0] / pair[1]).log2();
+        assert!(order >= 7.2, "order {order:.1} of {errors:?}");
+    }
+}
+
 /// The largest error is one order behind: it stands between the samples, near the curves.
 #[test]
 fn spheres_converge_with_order_six_and_more_in_the_mean_and_five_at_the_worst_place() {

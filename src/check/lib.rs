@@ -12,12 +12,14 @@ mod distance;
 mod evaluate;
 mod foot;
 mod lent_threads;
+mod nesting;
 mod params;
 mod report;
 mod sector;
 mod surface;
 mod topology;
 mod verdict;
+mod volume;
 
 #[cfg(test)]
 mod box_spline;

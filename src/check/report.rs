@@ -80,7 +80,7 @@ pub struct CheckReport {
 }
 
 /// One connected component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Component {
     /// Number of faces.
     pub faces: u64,
@@ -90,6 +90,10 @@ pub struct Component {
     pub euler_characteristic: i64,
     /// Genus; absent unless the component is closed.
     pub genus: Option<i64>,
+    /// Volume that it encloses, model units cubed; negative around a hollow.
+    pub volume: f64,
+    /// Components around it: odd for a hollow, even and not 0 for a part within one.
+    pub depth: u32,
 }
 
 /// What keeps faces from being a closed, oriented manifold; all zero on a sound surface.

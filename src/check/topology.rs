@@ -2,6 +2,7 @@
 
 use crate::report::{Component, EdgeDefects};
 use crate::surface::Surface;
+use crate::{nesting, volume};
 use isospline_geometry::HalfEdge;
 
 /// Marks a half-edge that has no single, oppositely directed partner.
@@ -124,15 +125,27 @@ fn fan_length(opposite: &[u32], start: u32) -> usize {
 fn components(surface: &Surface<'_>, opposite: &[u32]) -> Vec<Component> {
     let mut seen = vec![false; surface.faces().len()];
     let mut out = Vec::new();
+    let mut faces_of = Vec::new();
     for seed in 0..seen.len() as u32 {
         if !seen[seed as usize] {
-            out.push(component(surface, opposite, seed, &mut seen));
+            let (component, faces) = component(surface, opposite, seed, &mut seen);
+            out.push(component);
+            faces_of.push(faces);
         }
+    }
+    for (component, depth) in out.iter_mut().zip(nesting::depths(surface, &faces_of)) {
+        component.depth = depth;
     }
     out
 }
 
-fn component(surface: &Surface<'_>, opposite: &[u32], seed: u32, seen: &mut [bool]) -> Component {
+/// The component that holds a face, and its faces.
+fn component(
+    surface: &Surface<'_>,
+    opposite: &[u32],
+    seed: u32,
+    seen: &mut [bool],
+) -> (Component, Vec<u32>) {
     let (mut faces, mut n_alone, mut n_paired) = (vec![seed], 0, 0);
     seen[seed as usize] = true;
     let mut next = 0;
@@ -156,12 +169,15 @@ fn component(surface: &Surface<'_>, opposite: &[u32], seed: u32, seen: &mut [boo
     let n_edges = n_alone + n_paired / 2;
     let euler_characteristic = vertices.len() as i64 - n_edges + faces.len() as i64;
     let is_closed = n_alone == 0 && euler_characteristic % 2 == 0;
-    Component {
+    let component = Component {
         faces: faces.len() as u64,
         vertices: vertices.len() as u64,
         euler_characteristic,
         genus: is_closed.then_some(1 - euler_characteristic / 2),
-    }
+        volume: volume::enclosed(surface, &faces),
+        depth: 0,
+    };
+    (component, faces)
 }
 
 #[cfg(test)]

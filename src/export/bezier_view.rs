@@ -57,7 +57,7 @@ mod tests {
             format!("{x:?} {y:?} {z:?}")
         };
         // The second patch: its base has eight points, the last point is alone in its row.
-        let patch = &lines[1 + 38 + 2..1 + 2 * 38];
+        let patch = &lines[1 + 38 + 2..][..36];
         assert_eq!([patch[0], patch[7], patch[35]], [corner(0), corner(1), corner(2)]);
     }
 }

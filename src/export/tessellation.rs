@@ -178,7 +178,7 @@ impl<'a> Tessellation<'a> {
             Place::Corner(corner) => corner_point(self.patches, f, corner),
             Place::Edge { corner, step } => {
                 let n = shape.segments[corner];
-                let step = self.from_lower(f, corner, step);
+                let step = self.steps_up(f, corner, step);
                 bezier_curve::evaluate(&curves[corner], step as f64 / n as f64)
             }
             Place::Inner { .. } => evaluate(&net, shape.at(*place)).0,
@@ -199,14 +199,14 @@ impl<'a> Tessellation<'a> {
             Place::Corner(corner) => self.patches.face[f][corner],
             Place::Edge { corner, step } => {
                 let edge = self.patches.edge_of[3 * f + corner] as usize;
-                self.first_on_edge[edge] + self.from_lower(f, corner, step) as u32 - 1
+                self.first_on_edge[edge] + self.steps_up(f, corner, step) as u32 - 1
             }
             Place::Inner { slot, .. } => self.first_in_face[f] + slot as u32,
         }
     }
 
     /// Turns steps from `corner` into steps from the lower vertex of its edge, and back.
-    fn from_lower(&self, f: usize, corner: usize, step: usize) -> usize {
+    fn steps_up(&self, f: usize, corner: usize, step: usize) -> usize {
         if runs_up(self.patches, f, corner) {
             return step;
         }

@@ -4,7 +4,7 @@ use crate::inside::Side;
 use crate::{Field, Interval};
 use isospline_geometry::{Aabb, Vec3};
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, VecDeque};
 use thiserror::Error;
 
 /// Free space beside the zero set on each side, as a part of the box: the models of MATH.md have
@@ -21,6 +21,10 @@ const MAX_CELLS: usize = 60_000;
 /// Depths from which a cell of unknown enclosure counts as empty: if all its samples are NaN, and
 /// if none differ in sign. Without them the border of a field's domain would count as surface.
 const UNDEFINED_DEPTHS: [u32; 2] = [6, 18];
+
+/// Depth of a cell at the limit from which on it counts as one where f comes to zero, if no sample
+/// differs in sign and the enclosure is bounded: about 1e-5 of the search cube a side.
+const TOUCHING_DEPTH: u32 = 51;
 
 /// Points a side of the first grid of samples, 0.1 ms for deccube: where it meets the set, the
 /// search knows from the start how exact it has to be.
@@ -53,7 +57,7 @@ pub enum BoundsError {
         high: f64,
     },
     /// `x^2 + y^2 + z^2`
-    #[error("f does not change sign: it lies between {low} and {high}, nearest to zero by [{}, {}, {}]", near[0], near[1], near[2])]
+    #[error("f does not change sign: it lies between {low} and {high}, nearest to zero by ({}, {}, {})", near[0], near[1], near[2])]
     NoChangeOfSign {
         /// Smallest value seen.
         low: f64,
@@ -67,6 +71,16 @@ pub enum BoundsError {
     Undefined {
         /// Half side of the cube searched.
         limit: f64,
+    },
+    /// `max(x^2 + y^2 + z^2 - 1, min(0, z - 2))`
+    #[error("f comes to zero without changing its sign as far as the limit {limit} at {side}, near ({}, {}, {}): no box is sure to hold the surface", near[0], near[1], near[2])]
+    TouchesLimit {
+        /// Where.
+        side: Side,
+        /// Half side of the cube searched.
+        limit: f64,
+        /// A point there.
+        near: [f64; 3],
     },
     /// `x^2 + y^2 - 1`
     #[error("the surface reaches the limit {limit} at {side}")]
@@ -104,10 +118,15 @@ pub fn auto_box(field: &dyn Field, limit: f64) -> Result<Aabb, BoundsError> {
     let whole = Cell { aabb: Aabb::new(-corner, corner), depth: 0, axis: 0 };
     let mut search = Search::new(field, whole);
     search.seed(&whole.aabb);
-    for side in Side::ALL {
-        search.settle(side)?;
+    match search.settled(limit) {
+        Err(BoundsError::NoChangeOfSign { .. }) => {}
+        found => return found,
     }
-    search.finish(limit)
+    // Where f is zero at a corner of all cells around it, as `(x-1)^2 + y^2 + z^2 - 1` is at the
+    // origin, the cells that reach farthest lead there and nowhere else: look everywhere alike.
+    let mut search = Search::new(field, whole);
+    search.spread()?;
+    search.settled(limit)
 }
 
 /// A part of the search cube that may hold a zero.
@@ -208,14 +227,41 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Settles all sides.
+    fn settled(&mut self, limit: f64) -> Result<Aabb, BoundsError> {
+        for side in Side::ALL {
+            self.settle(side, limit)?;
+        }
+        self.finish(limit)
+    }
+
+    /// Splits all cells alike until a change of sign is found, with half of the work at most.
+    fn spread(&mut self) -> Result<(), BoundsError> {
+        let mut cells: VecDeque<Cell> = self.cells.drain(..).collect();
+        while self.proven.min.x > self.proven.max.x && self.n_seen < MAX_CELLS / 2 {
+            let Some(largest) = cells.pop_front() else { break };
+            for mut cell in largest.halves() {
+                if self.may_hold_zero(&mut cell, Side::XMin)? {
+                    cells.push_back(cell);
+                }
+            }
+        }
+        self.cells = cells.into();
+        Ok(())
+    }
+
     /// Splits cells until none reaches much farther to `side` than the zeros found.
-    fn settle(&mut self, side: Side) -> Result<(), BoundsError> {
+    fn settle(&mut self, side: Side, limit: f64) -> Result<(), BoundsError> {
         let rank = |cell: Cell| Ranked { reach: side.reach(&cell.aabb), cell };
         let mut heap: BinaryHeap<Ranked> = self.cells.drain(..).map(rank).collect();
         while let Some(farthest) = heap.pop() {
             if farthest.reach <= self.goal(side) || self.n_seen >= MAX_CELLS {
                 heap.push(farthest);
                 break;
+            }
+            if farthest.reach >= limit && farthest.cell.depth >= TOUCHING_DEPTH {
+                let near = farthest.cell.aabb.center().into();
+                return Err(BoundsError::TouchesLimit { side, limit, near });
             }
             for mut cell in farthest.cell.halves() {
                 if self.may_hold_zero(&mut cell, side)? {
@@ -400,6 +446,22 @@ mod tests {
             6.0,
             [4.9014, 4.9014, 4.9336],
         );
+    }
+
+    #[test]
+    fn a_surface_that_touches_the_planes_of_bisection_is_found() {
+        for text in ["(x-1)^2+y^2+z^2-1", "x^2+(y+2)^2+z^2-4", "(x-1)^2+(y-1)^2+(z-1)^2-1"] {
+            let found = find(text, 1000.0).unwrap();
+            let size = found.size().max();
+            assert!((2.0..10.0).contains(&size), "{text}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_field_that_touches_zero_as_far_as_the_limit_is_told_with_a_place() {
+        let error = find("min(x^2+y^2+z^2-1, max(abs(y-3)+abs(z), 0))", 1000.0).unwrap_err();
+        let BoundsError::TouchesLimit { near, .. } = error else { panic!("{error}") };
+        assert!((near[1] - 3.0).abs() < 0.1 && near[2].abs() < 0.1, "{near:?}");
     }
 
     #[test]

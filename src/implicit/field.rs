@@ -77,6 +77,13 @@ pub trait Field: Send + Sync {
         out.fill(None);
     }
 
+    /// Names of the functions with kinks, such as `min`, that choose otherwise at `a` than at `b`:
+    /// between them runs an edge along which the gradient may jump. Empty where that is not known.
+    fn kinks_between(&self, a: Vec3, b: Vec3) -> Vec<&'static str> {
+        let _ = (a, b);
+        Vec::new()
+    }
+
     /// Enclosure of the value over a box: the better of [`Field::value_enclosure`] and the mean
     /// value form `f(c) + grad f(box) . (box - c)`, whose excess falls with the square of the size
     /// of the box instead of the size. Three times as expensive.
@@ -181,6 +188,10 @@ impl<F: Field> Field for Oriented<F> {
         }
     }
 
+    fn kinks_between(&self, a: Vec3, b: Vec3) -> Vec<&'static str> {
+        self.inner.kinks_between(a, b)
+    }
+
     fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {
         self.inner.bend_enclosures(domains, out);
         for bend in out.iter_mut().flatten() {
@@ -238,6 +249,9 @@ macro_rules! forward_field {
                 out: &mut [Option<IntervalBend>],
             ) {
                 (**self).bend_enclosures(domains, out);
+            }
+            fn kinks_between(&self, a: Vec3, b: Vec3) -> Vec<&'static str> {
+                (**self).kinks_between(a, b)
             }
         }
     )*};

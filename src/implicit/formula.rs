@@ -31,6 +31,7 @@ use crate::evaluator;
 use crate::formula_error::FormulaError;
 use crate::interval_evaluator::enclose;
 use crate::interval_lanes::enclose_all;
+use crate::kinks;
 use crate::lowering::{self, Target};
 use crate::tape::Tape;
 use crate::{Field, Interval, IntervalBend, IntervalJet, Jet1, Jet2};
@@ -194,6 +195,10 @@ impl Field for Formula {
         enclose_all::<4, _>(tape, domains, out, |[value, x, y, z]| {
             Some(IntervalJet { value, gradient: [x, y, z] })
         });
+    }
+
+    fn kinks_between(&self, a: Vec3, b: Vec3) -> Vec<&'static str> {
+        kinks::between(&self.dag, self.root, a, b)
     }
 
     fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {

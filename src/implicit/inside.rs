@@ -73,7 +73,7 @@ pub enum Inside {
 #[non_exhaustive]
 pub enum InsideError {
     /// `ln(x)` in a box around the origin.
-    #[error("f is {value} at [{}, {}, {}] on the side {side} of the box", point[0], point[1], point[2])]
+    #[error("f is {value} at ({}, {}, {}) on the side {side} of the box", point[0], point[1], point[2])]
     NotANumber {
         /// NaN.
         value: f64,
@@ -83,11 +83,11 @@ pub enum InsideError {
         point: [f64; 3],
     },
     /// A sphere of radius 1 in a box of half side 0.9.
-    #[error("the surface leaves the box through {side}, at [{}, {}, {}]", point[0], point[1], point[2])]
+    #[error("the surface leaves the box through {}, at ({}, {}, {})", names(sides), point[0], point[1], point[2])]
     LeavesBox {
-        /// Where.
-        side: Side,
-        /// A point of the surface on that side, or of the side in case all of it is outside.
+        /// Where, at least one.
+        sides: Vec<Side>,
+        /// A point of the surface on the first side, or of the side in case all of it is outside.
         point: [f64; 3],
     },
 }
@@ -114,21 +114,31 @@ pub fn resolve_inside(field: &dyn Field, aabb: &Aabb, inside: Inside) -> Result<
     }
     let n_negative: usize = faces.iter().map(|face| face.n_negative).sum();
     let n_positive: usize = faces.iter().map(|face| face.n_positive).sum();
-    for face in &faces {
-        if let Some([inner, outer]) = face.crossing {
-            let point = crossing(field, inner, outer);
-            return Err(InsideError::LeavesBox { side: face.side, point: point.into() });
-        }
+    let is_minority = |face: &Face| {
         let is_minority = (face.n_negative > 0) == (n_negative < n_positive);
-        if n_negative > 0 && n_positive > 0 && is_minority {
-            return Err(InsideError::LeavesBox { side: face.side, point: face.center.into() });
-        }
+        n_negative > 0 && n_positive > 0 && is_minority
+    };
+    let leaves = |face: &&Face| face.crossing.is_some() || is_minority(face);
+    if let Some(first) = faces.iter().find(leaves) {
+        let crossed = first.crossing.map(|[inner, outer]| crossing(field, inner, outer));
+        let point = crossed.unwrap_or(first.center).into();
+        let sides = faces.iter().filter(leaves).map(|face| face.side).collect();
+        return Err(InsideError::LeavesBox { sides, point });
     }
     Ok(match inside {
         Inside::Auto => n_negative > 0,
         Inside::Negative => false,
         Inside::Positive => true,
     })
+}
+
+/// The sides as a list: `x-, y+ and z+`.
+fn names(sides: &[Side]) -> String {
+    let names: Vec<String> = sides.iter().map(Side::to_string).collect();
+    match names.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 struct Face {
@@ -217,17 +227,26 @@ mod tests {
     #[test]
     fn a_surface_that_leaves_the_box_is_named_with_side_and_point() {
         let error = resolve("(x-0.5)^2+y^2+z^2-1", 1.2, Inside::Auto).unwrap_err();
-        let InsideError::LeavesBox { side: Side::XMax, point } = error else {
+        let InsideError::LeavesBox { sides, point } = error else {
             panic!("{error}");
         };
+        assert_eq!(sides, [Side::XMax]);
         assert!((point[0] - 1.2).abs() < 1e-15);
         assert!((point[1].hypot(point[2]).powi(2) - (1.0 - 0.49)).abs() < 1e-6);
     }
 
     #[test]
+    fn all_sides_that_the_surface_leaves_through_are_named() {
+        let error = resolve("x^2+y^2-1", 1.5, Inside::Auto).unwrap_err();
+        assert!(error.to_string().contains("through z- and z+, at ("), "{error}");
+    }
+
+    #[test]
     fn a_boundary_on_the_surface_and_undefined_values_are_refused() {
         let touching = resolve("x - 1", 1.0, Inside::Auto).unwrap_err();
-        assert!(matches!(touching, InsideError::LeavesBox { side: Side::XMax, .. }), "{touching}");
+        let InsideError::LeavesBox { sides, .. } = &touching else { panic!("{touching}") };
+        // The other sides touch it along their edges.
+        assert_eq!(sides[0], Side::XMax);
         let undefined = resolve("sqrt(x + 0.5) + 1", 1.0, Inside::Auto).unwrap_err();
         assert!(matches!(undefined, InsideError::NotANumber { side: Side::XMin, .. }));
         let whole_side = resolve("x - 0.999", 1.0, Inside::Auto).unwrap_err();

@@ -22,6 +22,7 @@ pub mod interval;
 mod interval_evaluator;
 mod interval_functions;
 mod interval_lanes;
+mod kinks;
 mod lexer;
 mod lowering;
 mod operation;

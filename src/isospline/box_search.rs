@@ -2,7 +2,9 @@
 
 use crate::ModelError;
 use isospline_geometry::{Aabb, Vec3};
-use isospline_implicit::{Field, Interval, IntervalJet, Jet1, Jet2, auto_box};
+use isospline_implicit::{
+    Field, Inside, InsideError, Interval, IntervalJet, Jet1, Jet2, auto_box, resolve_inside,
+};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Operations of the formula that the search may carry out: seconds, ten times what the longest
@@ -28,6 +30,31 @@ pub(crate) fn find(field: &dyn Field, operations: usize, limit: f64) -> Result<A
         return Err(ModelError::LongFormula { operations });
     }
     Ok(found?)
+}
+
+/// How far a surface goes that leaves its box.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reach {
+    /// It leaves a box of so many times the size as well.
+    Beyond(f64),
+    /// All of it lies in this box.
+    Within(Aabb),
+    /// That cannot be told.
+    Unknown,
+}
+
+/// How many times larger the box is in which the rest of a surface is looked for.
+const WIDER: f64 = 16.0;
+
+/// How far the surface goes that leaves `domain`.
+pub(crate) fn reach(field: &dyn Field, operations: usize, domain: &Aabb) -> Reach {
+    let (center, half) = (domain.center(), 0.5 * WIDER * domain.size());
+    let wider = Aabb::new(center - half, center + half);
+    if let Err(InsideError::LeavesBox { .. }) = resolve_inside(field, &wider, Inside::Auto) {
+        return Reach::Beyond(WIDER);
+    }
+    let limit = wider.min.abs().sup(&wider.max.abs()).max();
+    find(field, operations, limit).map_or(Reach::Unknown, Reach::Within)
 }
 
 /// Counts the work; once that is too much it is 1 everywhere, which ends any search for zeros.

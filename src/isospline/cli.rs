@@ -11,6 +11,7 @@ mod import;
 mod inspect;
 pub(crate) mod interrupt;
 mod lint;
+mod numbers;
 pub(crate) mod output;
 mod progress;
 mod render;

@@ -1,7 +1,7 @@
 //! A caller's own field becomes a surface in memory.
 
 use crate::config::{ConfigError, Inside, StageParams};
-use crate::folder::{CURVES_COUNTER, RELAX_TO, refused, up_to_curves};
+use crate::folder::{CURVES_COUNTER, refused, relax_goal, up_to_curves};
 use crate::model::{given_mesh, oriented};
 use crate::stages;
 use crate::tolerance::{Found, Round, Step, next};
@@ -195,7 +195,7 @@ impl<'f> ConvertJob<'_, 'f> {
 
     fn params(&self, faces: u32, tolerance: f64) -> StageParams {
         let mut params = self.options.stages.with_faces(faces);
-        params.relax.goal = params.relax.goal.max((RELAX_TO * tolerance).min(1.0));
+        params.relax.goal = params.relax.goal.max(relax_goal(tolerance));
         params
     }
 

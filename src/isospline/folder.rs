@@ -2,7 +2,7 @@
 
 mod rounds;
 
-pub(crate) use rounds::{CURVES_COUNTER, RELAX_TO, refused, up_to_curves};
+pub(crate) use rounds::{CURVES_COUNTER, refused, relax_goal, up_to_curves};
 pub use rounds::{ROUNDS_NOTE, Rounds};
 
 use crate::config::ModelFile;

@@ -13,6 +13,7 @@ pub mod report;
 pub mod stages;
 pub mod tolerance;
 
+pub use box_search::Reach;
 pub use convert::{Conversion, ConvertError, Options, convert, convert_with_events};
 pub use folder::{
     BASE_MESH_NOTE, FolderError, MODEL_NOTE, ModelFolder, REPORT_NOTE, ROUNDS_NOTE, Rounds,

@@ -1,6 +1,6 @@
 //! A model file becomes a field, a box and a base mesh: what the stages work on.
 
-use crate::box_search;
+use crate::box_search::{self, Reach};
 use crate::config::{ConfigError, Domain, Inside, ModelFile};
 use isospline_artifact::kinds::{Mesh, Topology};
 use isospline_geometry::Aabb;
@@ -35,6 +35,20 @@ pub enum ModelError {
         /// Operations of the formula.
         operations: usize,
     },
+    /// The formula lacks a coordinate: what it describes goes on for ever along that axis.
+    #[error("model.formula does not depend on {}: {}", free_axes(*depends_on), endless(*depends_on))]
+    TwoDimensional {
+        /// Whether it depends on x, y, z.
+        depends_on: [bool; 3],
+    },
+    /// The surface leaves the box that is given.
+    #[error("{error}; {}", told_reach(reach))]
+    LeavesBox {
+        /// Through which sides, and where.
+        error: InsideError,
+        /// How far it goes.
+        reach: Reach,
+    },
     /// The side that is solid cannot be told.
     #[error(transparent)]
     Inside(#[from] InsideError),
@@ -54,6 +68,31 @@ pub enum ModelError {
         /// What is wrong with it, and where.
         error: ObjError,
     },
+}
+
+fn free_axes(depends_on: [bool; 3]) -> String {
+    let free = ["x", "y", "z"].into_iter().zip(depends_on).filter(|(_, depends)| !depends);
+    free.map(|(axis, _)| axis).collect::<Vec<_>>().join(" and ")
+}
+
+fn endless(depends_on: [bool; 3]) -> &'static str {
+    match depends_on.iter().filter(|&&depends| depends).count() {
+        2 => "it is two-dimensional, and its surface a cylinder without ends",
+        1 => "it is one-dimensional, and its surface parallel planes",
+        _ => "it is a constant",
+    }
+}
+
+fn told_reach(reach: &Reach) -> String {
+    match reach {
+        Reach::Beyond(times) => format!("it leaves a box {times} times as large as well"),
+        Reach::Within(domain) => {
+            let (min, max) = (domain.min, domain.max);
+            let sides = [0, 1, 2].map(|k| format!("[{:?}, {:?}]", short(min[k]), short(max[k])));
+            format!("all of it lies in [{}]", sides.join(", "))
+        }
+        Reach::Unknown => "how far it goes is not known".to_owned(),
+    }
 }
 
 impl ModelError {
@@ -86,14 +125,32 @@ impl Model {
         let model = &file.model;
         let formula = Formula::parse(&model.formula, &model.parameters)
             .map_err(|error| ModelError::formula(&model.formula, error))?;
+        let depends_on = formula.depends_on();
+        // Only of a field that has a surface: that there is none would be the better message.
+        let is_flat = depends_on.contains(&false) && depends_on.contains(&true);
+        let operations = formula.canonical().lines().count();
         let level = Oriented { inner: &formula, level: model.level, flipped: false };
         let domain = if let Some(domain) = model.domain.given() {
             domain
         } else {
-            let operations = formula.canonical().lines().count();
-            box_search::find(&level, operations, model.box_limit)?
+            match box_search::find(&level, operations, model.box_limit) {
+                Err(ModelError::Box(error)) if is_flat && has_zeros(&error) => {
+                    return Err(ModelError::TwoDimensional { depends_on });
+                }
+                found => found?,
+            }
         };
-        let field = oriented(formula, model.level, model.inside, &domain)?;
+        let flipped = match resolve_inside(&level, &domain, model.inside.into()) {
+            Err(InsideError::LeavesBox { .. }) if is_flat => {
+                return Err(ModelError::TwoDimensional { depends_on });
+            }
+            Err(error @ InsideError::LeavesBox { .. }) => {
+                let reach = box_search::reach(&level, operations, &domain);
+                return Err(ModelError::LeavesBox { error, reach });
+            }
+            flipped => flipped?,
+        };
+        let field = Oriented { inner: formula, level: model.level, flipped };
         let read = model.base_mesh.as_deref().map(read_base_mesh).transpose()?;
         let (base_mesh, base_mesh_text) = read.unzip();
         Ok(Self { file, field, domain, base_mesh, base_mesh_text })
@@ -132,6 +189,11 @@ impl Model {
         }
         remarks
     }
+}
+
+/// Whether the search for a box found zeros, but no end of them.
+fn has_zeros(error: &BoundsError) -> bool {
+    !matches!(error, BoundsError::Empty { .. } | BoundsError::Undefined { .. })
 }
 
 /// The number to five digits.

@@ -6,7 +6,7 @@ use crate::complex::Complex;
 use crate::error::Side;
 use crate::grid::{Grid, Site};
 use isospline_geometry::Vec3;
-use isospline_implicit::{Field, Interval};
+use isospline_implicit::{Field, Interval, Jet1};
 use isospline_stage::Ctx;
 
 /// How often a side of a cell is cut in four before it is left undecided.
@@ -100,7 +100,8 @@ fn look(field: &dyn Field, flat: [Interval; 3], reach: f64, depth: u32) -> Findi
         let jet = field.gradient(middle);
         // Not "greater": NaN is no contact, it is unknown.
         let is_near = jet.value.abs() <= reach * jet.gradient.norm();
-        return if is_near { Finding::Contact(middle) } else { Finding::Unknown };
+        let is_contact = is_near && changes_sign(field, middle, &jet, reach);
+        return if is_contact { Finding::Contact(middle) } else { Finding::Unknown };
     }
     let mut found = Finding::Clear;
     for quarter in 0..4u32 {
@@ -116,6 +117,15 @@ fn look(field: &dyn Field, flat: [Interval; 3], reach: f64, depth: u32) -> Findi
         }
     }
     found
+}
+
+/// Whether f has both signs within twice `reach` of a point, along its gradient there or exactly
+/// there: faces that meet in CSG leave lines on which f is zero and has one sign all around.
+fn changes_sign(field: &dyn Field, at: Vec3, jet: &Jet1, reach: f64) -> bool {
+    let along = jet.gradient * (2.0 * reach / jet.gradient.norm());
+    let is_inside = |p: Vec3| field.value(p) < 0.0;
+    // Touching with a gradient of zero is left to the search for singular points.
+    !along.iter().all(|x| x.is_finite()) || is_inside(at + along) != is_inside(at - along)
 }
 
 /// By the plain enclosure or by the mean value form `f(m) + grad f . (x - m)`, whose excess

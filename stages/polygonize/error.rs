@@ -30,6 +30,43 @@ pub enum PolygonizeError {
         /// Largest value seen.
         max: f64,
     },
+    /// f touches zero without changing its sign, as `(x^2 + y^2 + z^2 - 1)^2` does: there is no
+    /// inside.
+    #[error(
+        "f does not change its sign: it touches zero near ({}, {}, {}) and stays within \
+         [{min:?}, {max:?}] in the box",
+        at.x, at.y, at.z
+    )]
+    NoSignChange {
+        /// A point where it is zero.
+        at: Vec3,
+        /// Least value seen.
+        min: f64,
+        /// Largest value seen.
+        max: f64,
+    },
+    /// The gradient vanishes all over the surface, as that of `(x^2 + y^2 + z^2 - 1)^3` does.
+    #[error(
+        "the level is not regular: grad f vanishes all over the surface, as near ({}, {}, {})",
+        at.x, at.y, at.z
+    )]
+    LevelNotRegular {
+        /// One such point.
+        at: Vec3,
+    },
+    /// The surface has a sharp edge or tip.
+    #[error(
+        "the surface has a sharp edge of {:.1} degrees at ({}, {}, {}){}",
+        angle_deg, at.x, at.y, at.z, made_by(kinks)
+    )]
+    SharpEdge {
+        /// A point on it.
+        at: Vec3,
+        /// The angle between the normals on both sides.
+        angle_deg: f64,
+        /// Functions of the formula that make it, such as `min`; empty where that is not known.
+        kinks: Vec<&'static str>,
+    },
     /// The surface reaches a side of the box.
     #[error("the surface leaves the box at side {side} near ({}, {}, {})", at.x, at.y, at.z)]
     LeavesBox {
@@ -65,12 +102,16 @@ pub enum PolygonizeError {
     },
     /// Enclosures leave room for surface at a place where the mesh has none.
     #[error(
-        "the surface may have a part near ({}, {}, {}) that the grid cannot show",
-        at.x, at.y, at.z
+        "the surface may have a part near ({}, {}, {}) that the grid cannot show{}",
+        at.x, at.y, at.z, how_thin(*thickness, *cell)
     )]
     ThinnerThanGrid {
         /// A point there.
         at: Vec3,
+        /// How thick the part is along the gradient, model units, if that can be told.
+        thickness: Option<f64>,
+        /// Side of a cell, model units.
+        cell: f64,
     },
     /// The surface touches more cells than allowed.
     #[error("a grid of {cells} cells a side has more than {limit} cells on the surface")]
@@ -88,10 +129,21 @@ pub enum PolygonizeError {
     Stopped(#[from] Stopped),
 }
 
+fn made_by(kinks: &[&str]) -> String {
+    if kinks.is_empty() { String::new() } else { format!(", made by {}", kinks.join(" and ")) }
+}
+
+fn how_thin(thickness: Option<f64>, cell: f64) -> String {
+    thickness.map_or_else(String::new, |t| format!(": it is {t:.2e} thick, a cell {cell:.2e}"))
+}
+
 impl Diagnosis for PolygonizeError {
     fn code(&self) -> &'static str {
         match self {
             Self::EmptyLevelSet { .. } => "empty-level-set",
+            Self::NoSignChange { .. } => "no-sign-change",
+            Self::LevelNotRegular { .. } => "level-not-regular",
+            Self::SharpEdge { .. } => "sharp-edge",
             Self::LeavesBox { .. } => "leaves-box",
             Self::NotANumber { .. } => "not-a-number",
             Self::SingularPoint { .. } => "singular-point",
@@ -106,8 +158,11 @@ impl Diagnosis for PolygonizeError {
     fn place(&self) -> Option<Vec3> {
         match self {
             Self::LeavesBox { at, .. }
+            | Self::NoSignChange { at, .. }
+            | Self::LevelNotRegular { at }
+            | Self::SharpEdge { at, .. }
             | Self::NotANumber { at }
-            | Self::ThinnerThanGrid { at }
+            | Self::ThinnerThanGrid { at, .. }
             | Self::SingularPoint { at, .. } => Some(*at),
             _ => None,
         }
@@ -121,6 +176,16 @@ impl Diagnosis for PolygonizeError {
             Self::EmptyLevelSet { .. } => "check model.box and model.level",
             Self::LeavesBox { .. } => {
                 "enlarge model.box on that side if the surface is closed; open surfaces are refused"
+            }
+            Self::NoSignChange { .. } => {
+                "a surface has an inside: set model.level off zero, or take the root of a square"
+            }
+            Self::LevelNotRegular { .. } => {
+                "take the root of a power that stands alone in the formula, or change model.level"
+            }
+            Self::SharpEdge { .. } => {
+                "round it off: smin(a, b, k) and smax(a, b, k) for min and max, \
+                 sqrt(a^2 + k^2) for abs(a); k is the width of the rounding"
             }
             Self::NotANumber { .. } => {
                 "make the formula defined there, or shrink model.box so that the point is outside"

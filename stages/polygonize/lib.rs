@@ -38,6 +38,9 @@
 //! roots of f keeps every piece in its tetrahedron. Merging short edges keeps the topological
 //! type by the link condition.
 //!
+//! A mesh across which the gradient of f jumps, however near its sides are, is refused after that:
+//! the surface has a sharp edge there, which no smooth patches follow.
+//!
 //! Otherwise (kinks, fields without intervals, the depth limit) two grids of n >= 32 and 2 n cells
 //! that agree in the Euler characteristic and the volume of every component give
 //! [`TopologyProof::Observed`], which proves nothing: what falls between the nodes of both is
@@ -59,8 +62,10 @@ mod observation;
 pub mod params;
 mod proof;
 mod resolution;
+mod sharp_edges;
 mod short_edges;
 mod singular;
+mod small_parts;
 mod surface_cells;
 #[cfg(test)]
 mod tests;
@@ -116,6 +121,8 @@ impl Stage for Polygonize {
     ) -> Result<Piece<Mesh>, PolygonizeError> {
         let mut counters = Counters::default();
         let (mesh, proof) = polygonize(ctx, &self.params, &mut counters)?;
+        sharp_edges::none_on(ctx, &mesh)?;
+        let mesh = small_parts::without(mesh, self.params.drop_below, &mut counters);
         let rows = Mesh::from_triangles(&mesh, proof)
             .expect("invariant: merging keeps a manifold manifold");
         counters.count("triangles", rows.face.len() as u64);
@@ -184,8 +191,13 @@ fn triangulate(
         Vec::new()
     };
     let observed = observation::observe(ctx, &grid, params, &doubtful)?;
-    lost_parts::none_is_lost(ctx, &observed, &doubtful)?;
-    Ok((extract(ctx, observed)?, TopologyProof::Observed))
+    let lost = lost_parts::none_is_lost(ctx, &observed, &doubtful);
+    let mesh = extract(ctx, observed)?;
+    if lost.is_err() {
+        // A finer grid would not mend a sharp edge: that is the better message.
+        sharp_edges::none_on(ctx, &mesh)?;
+    }
+    lost.map(|()| (mesh, TopologyProof::Observed))
 }
 
 fn extract(ctx: &Ctx<'_>, mut complex: Complex) -> Result<TriangleMesh, PolygonizeError> {

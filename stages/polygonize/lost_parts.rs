@@ -20,6 +20,8 @@ use isospline_stage::Ctx;
 const BESIDE: u32 = 2;
 /// Boxes looked at in one failed box before it counts as holding surface.
 const MOST_BOXES: u32 = 4000;
+/// Halvings of a cell in which the two sides of a thin part are looked for.
+const HALVINGS: u32 = 30;
 /// Halvings along every axis after which an unbounded enclosure counts as that of a pole.
 const POLE_DEPTH: u32 = 20;
 
@@ -42,7 +44,31 @@ pub(crate) fn none_is_lost(
 ) -> Result<(), PolygonizeError> {
     let seen = Seen::of(complex);
     let place = doubtful.iter().find_map(|part| seen.suspect(ctx.field, *part));
-    place.map_or(Ok(()), |at| Err(PolygonizeError::ThinnerThanGrid { at }))
+    place.map_or(Ok(()), |at| Err(thinner(ctx.field, &complex.grid, at)))
+}
+
+/// The error that tells of a part near `at` that `grid` cannot show.
+pub(crate) fn thinner(field: &dyn Field, grid: &Grid, at: Vec3) -> PolygonizeError {
+    let cell = grid.lattice_step() * f64::from(grid.scale());
+    PolygonizeError::ThinnerThanGrid { at, thickness: thickness(field, at, cell), cell }
+}
+
+/// How far f keeps its sign along the gradient through `at`; `None` if that is more than a cell.
+fn thickness(field: &dyn Field, at: Vec3, cell: f64) -> Option<f64> {
+    let jet = field.gradient(at);
+    let along = jet.gradient.try_normalize(0.0).filter(|n| n.iter().all(|x| x.is_finite()))?;
+    let keeps_sign = |t: f64| (field.value(at + along * t) < 0.0) == (jet.value < 0.0);
+    let reach = |direction: f64| {
+        let far = |k: u32| cell / f64::from(1_u32 << (HALVINGS - k));
+        let beyond = (0..=HALVINGS).find(|&k| !keeps_sign(direction * far(k)))?;
+        let (mut lo, mut hi) = (if beyond == 0 { 0.0 } else { far(beyond - 1) }, far(beyond));
+        for _ in 0..HALVINGS {
+            let middle = f64::midpoint(lo, hi);
+            *if keeps_sign(direction * middle) { &mut lo } else { &mut hi } = middle;
+        }
+        Some(hi)
+    };
+    Some(reach(1.0)? + reach(-1.0)?)
 }
 
 /// Where a mesh is.

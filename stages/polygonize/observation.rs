@@ -4,7 +4,7 @@ use crate::complex::Complex;
 use crate::crossing;
 use crate::error::PolygonizeError;
 use crate::grid::Grid;
-use crate::lost_parts::middle;
+use crate::lost_parts::{middle, thinner};
 use crate::marching::Pieces;
 use crate::params::PolygonizeParams;
 use crate::surface_cells::{MOST_DENSE_CELLS, has_intervals, surface_cells};
@@ -83,7 +83,7 @@ fn components(
     let pieces = Pieces::of(complex);
     if pieces.crossings.is_empty() {
         return Err(match doubtful.first() {
-            Some(part) => PolygonizeError::ThinnerThanGrid { at: middle(part) },
+            Some(part) => thinner(ctx.field, &complex.grid, middle(part)),
             None => resolution::empty_level_set(ctx),
         });
     }

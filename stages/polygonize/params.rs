@@ -22,11 +22,21 @@ pub struct PolygonizeParams {
     /// Cells that the surface may touch before the run is refused. Unit: cells; range 1000 to
     /// 100 000 000; default 4 000 000, about 1 GB.
     pub max_cells: u32,
+    /// Size of a component below which it is left out: the diagonal of its box, of that of the
+    /// whole surface. Unit: 1; range 0 to below 1; default 0, which keeps all.
+    pub drop_below: f64,
 }
 
 impl Default for PolygonizeParams {
     fn default() -> Self {
-        Self { faces: 5000, oversampling: 2.0, cells: 0, max_depth: 5, max_cells: 4_000_000 }
+        Self {
+            faces: 5000,
+            oversampling: 2.0,
+            cells: 0,
+            max_depth: 5,
+            max_cells: 4_000_000,
+            drop_below: 0.0,
+        }
     }
 }
 
@@ -47,6 +57,9 @@ impl Params for PolygonizeParams {
         }
         if !within(self.max_cells, 1000, 100_000_000) {
             return Err(("max_cells", format!("{} is not within 1000 to 1e8", self.max_cells)));
+        }
+        if !(0.0..1.0).contains(&self.drop_below) {
+            return Err(("drop_below", format!("{} is not within 0 to below 1", self.drop_below)));
         }
         Ok(())
     }
@@ -69,5 +82,6 @@ mod tests {
         assert_eq!(key(|p| p.cells = 1), "cells");
         assert_eq!(key(|p| p.max_depth = 7), "max_depth");
         assert_eq!(key(|p| p.max_cells = 0), "max_cells");
+        assert_eq!(key(|p| p.drop_below = f64::NAN), "drop_below");
     }
 }

@@ -12,6 +12,9 @@ use isospline_stage::{Counters, Ctx, map};
 const CELLS_A_TASK: usize = 64;
 /// Failing tetrahedra from which a singular point is searched, spread over all that fail.
 const SEARCHES: usize = 16;
+/// Failing tetrahedra, of those that the surface passes, from which on it may be singular
+/// everywhere.
+const ALL: f64 = 0.95;
 /// Tetrahedra tested in refinement rounds, for each that the grid had and at least
 /// [`LEAST_BUDGET`], before the proof is given up: along a kink their number doubles with every
 /// halving and nothing is gained.
@@ -31,12 +34,15 @@ pub(crate) fn prove(
     counters: &mut Counters,
 ) -> Result<Vec<Tetrahedron>, PolygonizeError> {
     let mut failed = failing_cells(ctx, complex);
+    search_singular_points(ctx, complex, &failed, are_all(complex, &failed))?;
     let smallest = complex.grid.scale() >> params.max_depth;
     let mut budget = LEAST_BUDGET.max(BUDGET * 6 * complex.n_cells());
     let mut rounds = 0;
     while !failed.is_empty() {
         ctx.host.progress(rounds, 3 * u64::from(params.max_depth))?;
-        search_singular_points(ctx, complex, &failed)?;
+        if rounds > 0 {
+            search_singular_points(ctx, complex, &failed, false)?;
+        }
         counters.count("tetrahedra_refined", failed.len() as u64);
         if failed.len() > budget || failed.iter().any(|t| width(complex, t) <= smallest) {
             return Ok(failed);
@@ -55,7 +61,8 @@ pub(crate) fn prove(
 /// # Errors
 /// [`PolygonizeError::SingularPoint`] if there is one.
 pub(crate) fn no_singular_point(ctx: &Ctx<'_>, complex: &Complex) -> Result<(), PolygonizeError> {
-    search_singular_points(ctx, complex, &failing_cells(ctx, complex))
+    let failed = failing_cells(ctx, complex);
+    search_singular_points(ctx, complex, &failed, are_all(complex, &failed))
 }
 
 fn failing_cells(ctx: &Ctx<'_>, complex: &Complex) -> Vec<Tetrahedron> {
@@ -114,17 +121,38 @@ fn search_singular_points(
     ctx: &Ctx<'_>,
     complex: &Complex,
     failed: &[Tetrahedron],
+    is_everywhere: bool,
 ) -> Result<(), PolygonizeError> {
     let scale = complex.typical_value();
+    let mut first = None;
     for t in failed.iter().step_by(failed.len().div_ceil(SEARCHES).max(1)) {
         let points = t.map(|n| complex.point(n));
         let middle: Vec3 = 0.25 * points.iter().sum::<Vec3>();
         let around = Aabb::around(&points);
         let cell = complex.grid.lattice_step() * f64::from(complex.grid.scale());
         let reach = Aabb::new(around.min.add_scalar(-cell), around.max.add_scalar(cell));
-        if let Some(found) = singular::near(ctx.field, middle, &reach, scale, cell) {
-            return Err(found);
+        match singular::near(ctx.field, middle, &reach, scale, cell) {
+            Some(found) if !is_everywhere => return Err(found),
+            Some(found) => drop(first.get_or_insert(found)),
+            // One regular place is enough: what was found is a point or a curve.
+            None if is_everywhere => return first.map_or(Ok(()), Err),
+            None => {}
         }
     }
-    Ok(())
+    Err(match first {
+        None => return Ok(()),
+        Some(PolygonizeError::SingularPoint { at, .. }) => PolygonizeError::LevelNotRegular { at },
+        Some(other) => other,
+    })
+}
+
+/// Whether about all tetrahedra of the unrefined complex that have nodes on both sides failed.
+fn are_all(complex: &Complex, failed: &[Tetrahedron]) -> bool {
+    let crosses = |t: &Tetrahedron| {
+        let first = complex.inside(t[0]);
+        t[1..].iter().any(|&n| complex.inside(n) != first)
+    };
+    let count = |cell: usize| complex.tetrahedra(cell).filter(crosses).count();
+    let n_surface: usize = (0..complex.n_cells()).map(count).sum();
+    failed.len() >= SEARCHES && failed.len() as f64 >= ALL * n_surface as f64
 }

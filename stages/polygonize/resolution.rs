@@ -33,6 +33,9 @@ const MOST_GROWTH: f64 = 4.0;
 /// The box is cropped to the surface where that takes away this share of its longest side:
 /// otherwise a sphere in a box a million times its size would need as many cells.
 const CROP: f64 = 0.25;
+/// Size of the box, of that given, below which it is not cropped further: it closes in on a point
+/// where f touches zero, and squares of smaller numbers vanish.
+const POINT: f64 = 1e-60;
 
 /// A grid with what it shows.
 #[derive(Clone, Debug)]
@@ -63,6 +66,7 @@ pub(crate) fn choose(ctx: &Ctx<'_>, params: &PolygonizeParams) -> Result<Survey,
     let domain = crop(ctx, params, levels)?;
     let first = search(ctx, params, Grid::new(domain, FIRST_CELLS, levels))?;
     if first.n_triangles == 0 {
+        proof::no_singular_point(ctx, &first.complex).map_err(|error| touching(ctx, error))?;
         return survey(ctx, params.max_cells, Grid::new(domain, FIRST_CELLS, levels));
     }
     let cells = forecast(params, &first, f64::INFINITY);
@@ -137,7 +141,8 @@ fn search(ctx: &Ctx<'_>, params: &PolygonizeParams, grid: Grid) -> Result<Survey
             Err(PolygonizeError::TooManyCells { .. })
                 if seen.n_triangles == 0 && most < MOST_SOUGHT =>
             {
-                proof::no_singular_point(ctx, &seen.complex)?;
+                proof::no_singular_point(ctx, &seen.complex)
+                    .map_err(|error| touching(ctx, error))?;
                 most = MOST_SOUGHT;
             }
             Err(PolygonizeError::TooManyCells { .. }) => break,
@@ -154,8 +159,25 @@ fn survey(ctx: &Ctx<'_>, limit: u32, grid: Grid) -> Result<Survey, PolygonizeErr
     Ok(Survey { cells, complex, n_triangles })
 }
 
+/// A singular point where no node is on the other side is one where f touches zero.
+fn touching(ctx: &Ctx<'_>, error: PolygonizeError) -> PolygonizeError {
+    let (PolygonizeError::SingularPoint { at, .. } | PolygonizeError::LevelNotRegular { at }) =
+        error
+    else {
+        return error;
+    };
+    let [min, max] = range(ctx);
+    PolygonizeError::NoSignChange { at, min, max }
+}
+
 /// The error that says which values f takes, from the nodes of a coarse grid.
 pub(crate) fn empty_level_set(ctx: &Ctx<'_>) -> PolygonizeError {
+    let [min, max] = range(ctx);
+    PolygonizeError::EmptyLevelSet { min, max }
+}
+
+/// Least and largest value of f at the nodes of a coarse grid.
+fn range(ctx: &Ctx<'_>) -> [f64; 2] {
     let grid = Grid::new(ctx.domain, FIRST_CELLS, 0);
     let [nx, ny, nz] = grid.cells.map(|n| n + 1);
     let sites = (0..nx * ny * nz).map(|i| [i % nx, i / nx % ny, i / (nx * ny)]);
@@ -164,7 +186,7 @@ pub(crate) fn empty_level_set(ctx: &Ctx<'_>) -> PolygonizeError {
     let known = || values.iter().copied().filter(|f| !f.is_nan());
     let min = known().fold(f64::INFINITY, f64::min);
     let max = known().fold(f64::NEG_INFINITY, f64::max);
-    PolygonizeError::EmptyLevelSet { min, max }
+    [min, max]
 }
 
 /// The part of the domain that may hold surface, where that is much smaller.
@@ -184,7 +206,8 @@ fn crop(ctx: &Ctx<'_>, params: &PolygonizeParams, levels: u32) -> Result<Aabb, P
         let hi = fold(&cells, u32::max).map(|c| c + 1);
         let hull = grid.cell_box(lo, hi);
         let shrinks = hull.size().max() <= (1.0 - CROP) * domain.size().max();
-        if !shrinks || !hull.size().iter().all(|&s| s > 0.0) {
+        let is_point = hull.size().max() < POINT * ctx.domain.size().max();
+        if !shrinks || is_point || !hull.size().iter().all(|&s| s > 0.0) {
             return Ok(domain);
         }
         domain = hull;

@@ -11,10 +11,17 @@ const MOST_STEPS: u32 = 100;
 const VALUE_ZERO: f64 = 1e-10;
 const SLOPE_ZERO: f64 = 1e-6;
 
+/// How far, in cells, Newton's method may go on from a point that is flat.
+const NEAR: f64 = 1e-3;
+/// Decimals, finer and finer from the size of a cell, to which a coordinate of the place is rounded
+/// if that leaves the gradient no longer: at a root of high order Newton's method ends some way off.
+const MOST_ROUNDINGS: i32 = 6;
+
 /// Searches from `start` for a singular point within `reach` of it.
 ///
 /// `scale` is the size of f about the surface (values a cell away from it), `cell` the side of a
-/// cell.
+/// cell. At a multiple root the steps shrink by a constant factor only; they are carried on until
+/// the gradient falls no more, so that the place is told as well as it can be.
 pub(crate) fn near(
     field: &dyn Field,
     start: Vec3,
@@ -23,21 +30,62 @@ pub(crate) fn near(
     cell: f64,
 ) -> Option<PolygonizeError> {
     let mut at = start;
+    let mut found: Option<Flat> = None;
     for _ in 0..MOST_STEPS {
         let jet = field.hessian(at);
         let slope = jet.gradient.norm();
         let is_flat = slope * cell <= SLOPE_ZERO * scale;
         if is_flat && jet.value.abs() <= VALUE_ZERO * scale {
-            return Some(PolygonizeError::SingularPoint { at, value: jet.value, slope });
+            if found.as_ref().is_some_and(|flat| flat.slope <= slope) {
+                break;
+            }
+            found = Some(Flat { at, value: jet.value, slope });
         }
-        let step = step_to_flat(&jet.gradient, &jet.hessian)?;
+        let Some(step) = step_to_flat(&jet.gradient, &jet.hessian) else { break };
         // Steps longer than a cell leave the region where the test failed.
         at += step * (cell / step.norm()).min(1.0);
         if !reach.contains(&at) || step.norm() <= 1e-15 * at.norm() {
-            return None;
+            break;
         }
     }
-    None
+    // Across a thin sheet f varies so much that all else looks flat; but there the steps go on.
+    let flat = found.filter(|flat| (flat.at - at).norm() <= NEAR * cell)?;
+    Some(flat.told(field, cell))
+}
+
+/// A point where value and gradient are as good as zero.
+struct Flat {
+    at: Vec3,
+    value: f64,
+    slope: f64,
+}
+
+impl Flat {
+    fn told(mut self, field: &dyn Field, cell: f64) -> PolygonizeError {
+        let decimals = -libm::floor(libm::log10(cell)) as i32;
+        let finer = decimals..decimals + MOST_ROUNDINGS;
+        for axis in 0..3 {
+            if let Some(rounded) = finer.clone().find_map(|k| self.rounded(field, axis, k)) {
+                self = rounded;
+            }
+        }
+        PolygonizeError::SingularPoint { at: self.at, value: self.value, slope: self.slope }
+    }
+
+    /// The same place with a coordinate of so many decimals, if it is no less flat there.
+    fn rounded(&self, field: &dyn Field, axis: usize, decimals: i32) -> Option<Self> {
+        let unit = libm::pow(10.0, f64::from(decimals));
+        let mut at = self.at;
+        // Minus nothing is told as nothing.
+        at[axis] = (at[axis] * unit).round() / unit + 0.0;
+        let jet = field.gradient(at);
+        let (value, slope) = (jet.value, jet.gradient.norm());
+        (slope <= self.slope && value.abs() <= self.value.abs()).then_some(Self {
+            at,
+            value,
+            slope,
+        })
+    }
 }
 
 /// The Levenberg-Marquardt step for `grad f = 0`.

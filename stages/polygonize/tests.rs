@@ -5,7 +5,7 @@ use isospline_artifact::kinds::{Mesh, TopologyProof};
 use isospline_geometry::{Aabb, Vec3};
 use isospline_implicit::{ClosureField, Field, Formula};
 use isospline_stage::contract::Fixture;
-use isospline_stage::{Ctx, Diagnosis, Host, Piece, Serial, Stage, Stopped, Task};
+use isospline_stage::{Counters, Ctx, Diagnosis, Host, Piece, Serial, Stage, Stopped, Task};
 use std::collections::BTreeMap;
 
 const TORUS: &str = "(sqrt(x^2+y^2)-5)^2+z^2-1";
@@ -164,23 +164,64 @@ fn singular_points_are_found_with_their_place() {
     for (text, distance) in [
         ("x^2+y^2-z^2", (|p| p.norm()) as fn(Vec3) -> f64),
         ("(x^2+y^2+z^2)^2-(x^2-y^2-z^2)", |p| p.norm()),
-        ("(x^2+y^2+z^2-1)^2", |p| (p.norm() - 1.0).abs()),
-        ("0*x", |_| 0.0),
+        ("(x^2+y^2+z^2)^2-(x^2+y^2)", |p| p.norm()),
     ] {
         let error = error_of(text);
         let PolygonizeError::SingularPoint { at, .. } = error else { panic!("{text}: {error:?}") };
-        assert!(distance(at) < 1e-4, "{text}: {at}");
+        assert!(distance(at) < 1e-6, "{text}: {at}");
         assert!(error.place().is_some() && error.help().is_some());
     }
 }
 
 #[test]
-fn a_box_with_kinks_is_observed_and_not_certified() {
+fn a_field_that_touches_zero_or_is_flat_on_its_surface_is_told_from_a_singular_point() {
+    for (text, code) in [
+        ("(x^2+y^2+z^2-1)^2", "no-sign-change"),
+        ("x^2+y^2+z^2", "no-sign-change"),
+        ("(x^2+y^2+z^2-1)^3", "level-not-regular"),
+    ] {
+        let error = error_of(text);
+        assert_eq!(error.code(), code, "{text}: {error}");
+        let value = formula(text).value(error.place().unwrap());
+        assert!(value.abs() < 1e-6, "{text}: {error}");
+    }
+}
+
+#[test]
+fn a_thin_part_that_no_grid_shows_is_told_with_its_thickness() {
+    let text = "min(sqrt(x^2+y^2+z^2)-0.5, sqrt((x-1)^2+(y-0.3)^2+z^2)-1e-5)";
+    let params = PolygonizeParams { cells: 32, ..with_faces(500) };
+    let error = run(&formula(text), cube(1.3), &params).unwrap_err();
+    let PolygonizeError::ThinnerThanGrid { thickness, cell, .. } = &error else {
+        panic!("{error:?}")
+    };
+    assert!(thickness.is_none_or(|t| t < *cell), "{error}");
+}
+
+#[test]
+fn components_below_a_size_are_left_out() {
+    let text = "min(x^2+y^2+z^2-0.5, (x-1)^2+(y-0.5)^2+z^2-0.001)";
+    let components = |drop_below: f64| {
+        let params = PolygonizeParams { drop_below, ..with_faces(500) };
+        run(&formula(text), cube(1.3), &params).unwrap().rows.topology[0].components
+    };
+    assert_eq!([components(0.0), components(0.1)], [2, 1]);
+}
+
+#[test]
+fn a_box_with_kinks_is_observed_and_then_refused_for_its_sharp_edges() {
     let text = "sqrt(max(abs(x)-1,0)^2+max(abs(y)-0.7,0)^2+max(abs(z)-0.5,0)^2)\
                 +min(max(abs(x)-1,max(abs(y)-0.7,abs(z)-0.5)),0)";
-    let topology = run(&formula(text), cube(1.3), &with_faces(1000)).unwrap().rows.topology[0];
-    assert_eq!(topology.proof, TopologyProof::Observed.code());
-    assert_eq!((topology.components, topology.euler_characteristic), (1, 2));
+    let field = formula(text);
+    let ctx = Ctx { field: &field, domain: cube(1.3), host: &Serial };
+    let (mesh, proof) =
+        crate::polygonize(&ctx, &with_faces(1000), &mut Counters::default()).unwrap();
+    assert_eq!(proof, TopologyProof::Observed);
+    let opposite = mesh.opposites().unwrap();
+    assert_eq!(mesh.euler_characteristic(&opposite), 2);
+    let error = run(&field, cube(1.3), &with_faces(1000)).unwrap_err();
+    let PolygonizeError::SharpEdge { angle_deg, .. } = error else { panic!("{error:?}") };
+    assert!((angle_deg - 90.0).abs() < 1.0, "{angle_deg}");
 }
 
 #[test]

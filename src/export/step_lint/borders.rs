@@ -60,7 +60,9 @@ fn same_bits(a: &[Point], b: &[Point]) -> bool {
 /// Curves in reverse order and direction.
 fn turned(curves: &mut [Vec<Point>]) {
     curves.reverse();
-    curves.iter_mut().for_each(|curve| curve.reverse());
+    for curve in curves {
+        curve.reverse();
+    }
 }
 
 impl Net {

@@ -143,7 +143,7 @@ fn require_found(cases: &[Case], options: &Options) {
 }
 
 #[test]
-fn broken_shells_are_found() {
+fn shells_that_do_not_close_are_found() {
     let cases: &[Case] = &[
         ("a face turned over", "TurnedFace", |s| s.edit_kind("ADVANCED_FACE", 9, ".T.", ".F.")),
         ("a bound turned over", "EdgeUse", |s| s.edit_kind("FACE_OUTER_BOUND", 9, ".T.", ".F.")),
@@ -180,6 +180,13 @@ fn broken_shells_are_found() {
             s.replace(&format!("('',#{b},"), &format!("('',#{a},"))
                 .replace(&format!(",#{b},#"), &format!(",#{a},#"))
         }),
+    ];
+    require_found(cases, &Options::default());
+}
+
+#[test]
+fn shells_that_are_turned_or_stray_are_found() {
+    let cases: &[Case] = &[
         ("a void turned", "TurnedShell", |s| s.edit_kind("ORIENTED_CLOSED_SHELL", 0, ".T.", ".F.")),
         ("all turned inside out", "TurnedShell", |s| {
             let faces = s.replace(",.T.);\n", ",.X.);\n");
@@ -292,7 +299,7 @@ fn curves_in_parameters_that_are_another_side_are_found() {
         ("a line run backwards", "Pcurve", |s| {
             let pcurve = s.number("PCURVE", 4);
             let (line, first) = (s.named(pcurve)[1], s.number("DEFINITIONAL_REPRESENTATION", 0));
-            let back = first + ((line - first) / 5 ^ 1) * 5;
+            let back = first + (((line - first) / 5) ^ 1) * 5;
             s.edit(pcurve, |text| text.replacen(&format!("#{line}"), &format!("#{back}"), 1))
         }),
         ("a face that the edge does not bound", "Pcurve", |s| {
@@ -302,4 +309,33 @@ fn curves_in_parameters_that_are_another_side_are_found() {
     ];
     let step = StepOptions { pcurves: true, ..StepOptions::default() };
     require_found(cases, &Options { step, ..Options::default() });
+}
+
+#[test]
+fn no_change_of_bytes_makes_the_linter_panic() {
+    let step = StepOptions { compact: true, pcurves: true, ..StepOptions::default() };
+    let mut sound = Vec::new();
+    let options = Options { step, ..Options::default() };
+    write(Format::Step, &sample::flat_octahedron().view(), &options, &mut sound).unwrap();
+    assert_eq!(lint_step(std::str::from_utf8(&sound).unwrap()).unwrap().solids, 1);
+    let mut state = 1_u64;
+    let mut roll = |n: usize| {
+        // Numbers of Knuth's generator; its high bits are the good ones.
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as usize % n
+    };
+    let mut n_refused = 0;
+    for _ in 0..600 {
+        let mut bytes = sound.clone();
+        for _ in 0..=roll(3) {
+            let at = roll(bytes.len());
+            match roll(3) {
+                0 => bytes[at] = b"()'#,;.=*$0AE-"[roll(14)],
+                1 => drop(bytes.drain(at..(at + roll(40)).min(bytes.len()))),
+                _ => bytes.truncate(at.max(bytes.len() / 2)),
+            }
+        }
+        n_refused += usize::from(lint_step(&String::from_utf8_lossy(&bytes)).is_err());
+    }
+    assert!(n_refused > 400, "{n_refused} of 600 are refused");
 }

@@ -177,16 +177,15 @@ impl<'a> Cursor<'a> {
             '#' => {
                 self.cut_while(1, |c| c.is_ascii_digit())[1..].parse().ok().map(Value::Reference)
             }
-            '.' => match self.cut_while(1, |c| c != '.') {
-                word => {
-                    self.take('.')?;
-                    Some(match word {
-                        ".T" => Value::Flag(true),
-                        ".F" => Value::Flag(false),
-                        _ => Value::Other(word),
-                    })
-                }
-            },
+            '.' => {
+                let word = self.cut_while(1, |c| c != '.');
+                self.take('.')?;
+                Some(match word {
+                    ".T" => Value::Flag(true),
+                    ".F" => Value::Flag(false),
+                    _ => Value::Other(word),
+                })
+            }
             'A'..='Z' => {
                 let kind = self.cut_while(1, |c| c.is_ascii_alphanumeric() || c == '_');
                 self.list(depth).map(|inner| Value::Typed(kind, inner))

@@ -7,7 +7,7 @@ use super::part21::{Value, arguments, parts};
 /// The unit of length in metres, of the context of the shape representations.
 pub(super) fn length(model: &Model<'_>) -> Found<f64> {
     let unsaid = || StepDefect::Unsaid("in what unit lengths are");
-    let mut found = None;
+    let mut found: Option<f64> = None;
     for representation in model.all("ADVANCED_BREP_SHAPE_REPRESENTATION") {
         let context = representation?.reference(2)?;
         let units = part(model, context, "GLOBAL_UNIT_ASSIGNED_CONTEXT").ok_or_else(unsaid)?;
@@ -19,7 +19,7 @@ pub(super) fn length(model: &Model<'_>) -> Found<f64> {
         let is_length = |number: &u64| part(model, *number, "LENGTH_UNIT").is_some();
         let unit = units.iter().filter_map(number).find(is_length).ok_or_else(unsaid)?;
         let metres = metres(model, unit).ok_or_else(unsaid)?;
-        if found.is_some_and(|before| before != metres) {
+        if found.is_some_and(|before| before.to_bits() != metres.to_bits()) {
             return Err(StepDefect::Unsaid("one unit for all its lengths"));
         }
         found = Some(metres);

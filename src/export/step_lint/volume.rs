@@ -101,11 +101,11 @@ fn bernstein(degree: usize, t: f64) -> Vec<f64> {
 
 /// Whether a volume is the one among the validation properties.
 pub(super) fn against_stated(model: &Model<'_>, found: f64) -> Option<StepDefect> {
-    let items = model.all("MEASURE_REPRESENTATION_ITEM");
+    let mut items = model.all("MEASURE_REPRESENTATION_ITEM");
     let volume = |item: super::entities::Found<super::entities::Node<'_>>| {
         item.ok()?.measure(1, "VOLUME_MEASURE")
     };
-    let Some(stated) = items.filter_map(volume).next() else {
+    let Some(stated) = items.find_map(volume) else {
         return Some(StepDefect::Unsaid("what volume it has"));
     };
     let agree = (found - stated).abs() <= AGREE * stated.abs();

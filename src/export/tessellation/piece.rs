@@ -6,6 +6,7 @@
 //! every point, and comes within some 15 % of the truth for a piece that is nearly quadratic.
 
 use isospline_geometry::Vec3;
+use isospline_geometry::bezier_curve::raise_quartic_to_septic;
 use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index, exponents, index};
 
 type Net = [Vec3; N_CONTROL];
@@ -99,8 +100,9 @@ pub(super) fn faces_as(piece: &Net) -> bool {
 
 /// Whether the arc of a curve from `t0` to `t1` stays within `tolerance` of its chord.
 pub(super) fn is_arc_within(curve: &[Vec3; 5], [t0, t1]: [f64; 2], tolerance: f64) -> bool {
-    let arc = arc(curve, t0, t1);
-    let [start, end] = [arc[0], arc[4]];
+    // Points of a higher degree lie nearer to the arc: the bound falls from 33 % above to 14 %.
+    let arc = raise_quartic_to_septic(&arc(curve, t0, t1));
+    let [start, end] = [arc[0], arc[DEGREE]];
     let limit = tolerance * tolerance;
     arc.iter().all(|p| (p - nearest_in_segment(*p, start, end)).norm_squared() <= limit)
 }

@@ -126,8 +126,8 @@ fn segments_within(curve: &[Vec3; 5], tolerance: f64) -> u16 {
         if arcs.into_iter().all(|arc| is_arc_within(curve, arc, tolerance)) {
             break;
         }
-        // Past sixteen, steps of a sixteenth: a few segments too many for a tenth of the work.
-        n = (n + 1 + n / 16).min(MOST);
+        // Later in steps of a thirty-second: some segments too many for a tenth of the work.
+        n = (n + 1 + n / 32).min(MOST);
     }
     n as u16
 }
@@ -153,7 +153,7 @@ fn level_within(
     let mut level = 3.max(3 * most / 4);
     let finer = std::iter::from_fn(|| {
         let now = level;
-        level += 1 + now / 16;
+        level += 1 + now / 32;
         (now <= finest).then_some(now)
     });
     whole.into_iter().chain(grid).chain(finer).find(serves)

@@ -40,6 +40,9 @@ pub struct Part {
     /// Volume that it encloses, model units cubed; negative around a hollow.
     #[serde(default)]
     pub volume: Option<f64>,
+    /// Components around it.
+    #[serde(default)]
+    pub depth: u32,
 }
 
 /// What became of one model.

@@ -70,8 +70,10 @@ fn slurm(plan: &Plan) -> String {
     let n_tasks = n_models.min(MOST_TASKS);
     let (last, threads) = (n_tasks - 1, plan.threads);
     let log = plan.out.join(".batch/slurm-%a.log");
-    let models: String =
-        plan.models.iter().map(|model| format!("  {}\n", shell(&model.name))).collect();
+    let mut models = String::new();
+    for model in &plan.models {
+        writeln!(models, "  {}", shell(&model.name)).expect("invariant: a string takes all text");
+    }
     format!(
         "#!/bin/bash\n\
          # {n_models} models, one a task of a job array. Submit it with sbatch. When the array has\n\

@@ -103,15 +103,14 @@ pub fn record_key(model: &BatchModel, overrides: &[String]) -> String {
         key.field(name.as_bytes());
         key.number(u64::from(version));
     }
-    match ModelFile::open(&model.path, overrides) {
-        Ok(file) => {
-            key.field(file.to_toml().as_bytes());
-            let mesh = file.model.base_mesh.and_then(|path| std::fs::read(path).ok());
-            key.field(&mesh.unwrap_or_default());
-        }
-        Err(_) => {
-            key.field(&std::fs::read(&model.path).unwrap_or_default());
-            overrides.iter().for_each(|text| key.field(text.as_bytes()));
+    if let Ok(file) = ModelFile::open(&model.path, overrides) {
+        key.field(file.to_toml().as_bytes());
+        let mesh = file.model.base_mesh.and_then(|path| std::fs::read(path).ok());
+        key.field(&mesh.unwrap_or_default());
+    } else {
+        key.field(&std::fs::read(&model.path).unwrap_or_default());
+        for text in overrides {
+            key.field(text.as_bytes());
         }
     }
     key.finish().to_string()
@@ -202,8 +201,8 @@ mod tests {
         let path = folder.path().join(LINES);
         let whole = std::fs::read(&path).unwrap();
         for cut in 1..whole.len() / 2 {
-            let file = File::options().write(true).open(&path).unwrap();
-            file.set_len((whole.len() - cut) as u64).unwrap();
+            let torn = &whole[..whole.len() - cut];
+            write_file_atomic(&path, Durability::Fast, |out| out.write_all(torn)).unwrap();
             let summary = Summary::open(folder.path(), &keys(&["a", "b"])).unwrap();
             assert!(summary.record("a").is_some());
             // Without its newline the record is whole.

@@ -35,6 +35,9 @@ Exit codes:
    24  the faces are too few for the topology
    25  the surface cannot be converted for another reason
    26  the base mesh cannot be used
+   27  the formula lacks x, y or z
+   28  the surface has a sharp edge
+   29  the field does not change its sign
    30  an artifact is of another version of the program
    31  an artifact is damaged or missing
    32  the folder is in use by another isospline

@@ -230,7 +230,7 @@ impl<'a> Crew<'a> {
         {
             if patience.is_over() {
                 let (args, threads) = (self.args, self.threads);
-                self.running.push(Running::start(args, self.out, model, threads, patience)?);
+                self.running.push(Running::start(args, self.out, model, threads)?);
             } else {
                 waiting.push_back((model, patience));
             }
@@ -254,7 +254,7 @@ impl<'a> Crew<'a> {
                 Ending::Exit(code) if code == i32::from(STOPPED) => {}
                 Ending::Exit(code) if code == i32::from(crate::cli::failure::LOCKED) => {
                     // A run that outlived its batch is at it: what it makes will be fresh.
-                    self.todo.push_back((run.model, run.patience.again()));
+                    self.todo.push_back((run.model, Patience::again()));
                 }
                 _ => records.push(run.record(self.keys, ending)),
             }

@@ -1,9 +1,10 @@
 //! Every error as the user sees it: message, place, help and exit code.
 
 use crate::cli::excerpt::Excerpt;
+use crate::cli::numbers::rounded;
 use isospline::batch::BatchError;
 use isospline::config::{ConfigError, Place};
-use isospline::{FolderError, ModelError};
+use isospline::{FolderError, ModelError, Reach};
 use isospline_artifact::{Damage, StoreError};
 use isospline_implicit::{BoundsError, InsideError};
 use isospline_pipeline::RunError;
@@ -50,6 +51,9 @@ const LEAVES_BOX: u8 = 23;
 const TOO_FEW_FACES: u8 = 24;
 const OTHER_SURFACE: u8 = 25;
 const BAD_BASE_MESH: u8 = 26;
+const TWO_DIMENSIONAL: u8 = 27;
+const SHARP_EDGE: u8 = 28;
+const NO_SIGN_CHANGE: u8 = 29;
 const OTHER_VERSION: u8 = 30;
 const DAMAGED: u8 = 31;
 pub(crate) const LOCKED: u8 = 32;
@@ -58,10 +62,13 @@ pub(crate) const BUG: u8 = 70;
 pub(crate) const STOPPED: u8 = 130;
 
 /// Exit codes of the stages' own error codes; others are [`OTHER_SURFACE`].
-const STAGE_EXITS: [(&str, u8); 10] = [
+const STAGE_EXITS: [(&str, u8); 13] = [
     ("not-a-number", NOT_A_NUMBER),
     ("empty-level-set", EMPTY),
     ("singular-point", SINGULAR),
+    ("level-not-regular", SINGULAR),
+    ("no-sign-change", NO_SIGN_CHANGE),
+    ("sharp-edge", SHARP_EDGE),
     ("leaves-box", LEAVES_BOX),
     ("too-few-faces", TOO_FEW_FACES),
     ("mesh-empty", BAD_BASE_MESH),
@@ -73,7 +80,7 @@ const STAGE_EXITS: [(&str, u8); 10] = [
 
 impl Failure {
     pub(crate) fn new(exit: u8, code: &'static str, message: impl Into<String>) -> Self {
-        let message = clipped(message.into());
+        let message = clipped(rounded(&message.into()));
         Self { message, code, exit, help: None, place: None, pointer: None }
     }
 
@@ -115,11 +122,16 @@ impl Failure {
     /// Adds a point of space, to the message too where that does not name it.
     fn seen_at(mut self, place: Option<[f64; 3]>) -> Self {
         if let Some([x, y, z]) = place {
-            let told = format!("({x}, {y}, {z})");
+            let told = rounded(&format!("({x}, {y}, {z})"));
             if !self.message.contains(&told) {
                 self.message = format!("{}, at {told}", self.message);
             }
         }
+        Self { place, ..self }
+    }
+
+    /// Adds a point of space that the message names.
+    fn at(self, place: Option<[f64; 3]>) -> Self {
         Self { place, ..self }
     }
 
@@ -236,20 +248,50 @@ impl From<ModelError> for Failure {
             }
             ModelError::Box(error) => {
                 let (exit, code, help) = box_trouble(&error);
-                Self::new(exit, code, message).helped(help)
+                let place = match error {
+                    BoundsError::NoChangeOfSign { near, .. }
+                    | BoundsError::TouchesLimit { near, .. } => Some(near),
+                    _ => None,
+                };
+                Self::new(exit, code, message).helped(help).at(place)
             }
             ModelError::LongFormula { .. } => {
                 Self::new(BAD_KEY, "no-box", message).helped("state model.box")
             }
+            ModelError::TwoDimensional { .. } => {
+                Self::new(TWO_DIMENSIONAL, "two-dimensional", message)
+                    .helped("give it ends, such as smax(f, z^2 - h^2, k) along z")
+            }
+            ModelError::LeavesBox { error, reach } => {
+                let help = match reach {
+                    Reach::Within(_) => "set model.box to that",
+                    Reach::Beyond(_) => NOT_CLOSED,
+                    Reach::Unknown => "enlarge model.box if the surface is closed",
+                };
+                Self::new(LEAVES_BOX, "leaves-box", message).helped(help).at(inside_place(&error))
+            }
             ModelError::Inside(error) => {
                 let (exit, code, help) = inside_trouble(&error);
-                Self::new(exit, code, message).helped(help)
+                Self::new(exit, code, message).helped(help).at(inside_place(&error))
             }
             ModelError::MeshUnreadable { .. } => Self::new(UNREADABLE, "base-mesh", message)
                 .helped("model.base_mesh is relative to the model file"),
             ModelError::Mesh { .. } => Self::new(BAD_BASE_MESH, "base-mesh", message)
                 .helped("the base mesh is an OBJ of triangles"),
         }
+    }
+}
+
+/// What to do about a surface without end.
+const NOT_CLOSED: &str = "it seems to go on for ever, and a closed surface is needed: add a shape that ends it, such as \
+     smax(f, x^2 + y^2 + z^2 - r^2, k)";
+
+fn inside_place(error: &InsideError) -> Option<[f64; 3]> {
+    match error {
+        InsideError::NotANumber { point, .. } | InsideError::LeavesBox { point, .. } => {
+            Some(*point)
+        }
+        _ => None,
     }
 }
 
@@ -270,17 +312,21 @@ fn box_trouble(error: &BoundsError) -> (u8, &'static str, &'static str) {
             "set model.level within that range, or raise model.box_limit",
         ),
         BoundsError::NoChangeOfSign { .. } => (
-            SINGULAR,
-            "singular-point",
-            "a surface has an inside: set model.level above the least value",
+            NO_SIGN_CHANGE,
+            "no-sign-change",
+            "a surface has an inside: set model.level off zero, or take the root of a square",
         ),
+        BoundsError::TouchesLimit { .. } => {
+            (BAD_KEY, "no-box", "state model.box around the part that is wanted")
+        }
         BoundsError::Undefined { .. } => {
             (NOT_A_NUMBER, "not-a-number", "state model.box where the formula is defined")
         }
         BoundsError::ReachesLimit { .. } => (
             LEAVES_BOX,
             "leaves-box",
-            "a closed surface is needed; if it is one, raise model.box_limit",
+            "a closed surface is needed: add a shape that ends it, smax(f, g, k); if it is closed, \
+             raise model.box_limit",
         ),
         _ => (BAD_KEY, "no-box", "state model.box"),
     }
@@ -293,8 +339,7 @@ fn inside_trouble(error: &InsideError) -> (u8, &'static str, &'static str) {
             (NOT_A_NUMBER, "not-a-number", help)
         }
         InsideError::LeavesBox { .. } => {
-            let help = "enlarge model.box on that side if the surface is closed; open surfaces are refused";
-            (LEAVES_BOX, "leaves-box", help)
+            (LEAVES_BOX, "leaves-box", "enlarge model.box if the surface is closed")
         }
         _ => (OTHER_SURFACE, "no-inside", "set model.inside"),
     }

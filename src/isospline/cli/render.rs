@@ -19,9 +19,9 @@ Examples:
   isospline render out/deccube --style zebra --stage g0_fit --view -60,25
 
 zebra shows reflected stripes, which break where tangent planes do. curvature and gaussian show the
-mean and the Gaussian curvature, mean below 0 where convex; error shows
-the distance from the implicit surface over the diagonal. The stages import to adapt make meshes,
-g0_fit patches that only meet, fairing and relax the finished surface.";
+mean curvature, below 0 where convex, and the Gaussian; error shows the distance from the implicit
+surface over the diagonal. Stages up to adapt make meshes, g0_fit patches that only meet, fairing
+and relax the finished surface.";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct RenderArgs {

@@ -29,8 +29,12 @@ const TOO_FEW: [&str; 6] = [
     "degenerate-vertex",
 ];
 
-/// Part of the tolerance from which patches are not brought nearer: the worst patch decides.
-pub(crate) const RELAX_TO: f64 = 0.1;
+/// The distance from which patches are not brought nearer: part of the tolerance, since the worst
+/// patch decides, and no more than what unfolds coarse patches (deccube of 2661 faces at 1e-5 keeps
+/// two folds with 3e-6).
+pub(crate) fn relax_goal(tolerance: f64) -> f64 {
+    (0.1 * tolerance).min(1e-7)
+}
 
 /// The last stage of a round of curves, and the largest error that it counts.
 const CURVES_STAGE: &str = "network";
@@ -144,7 +148,7 @@ impl ModelFolder {
         if params.relax.goal <= 0.0 {
             // The box is a little larger than the surface, which does not matter here.
             let tolerance = file.target.tolerance(self.model.domain.diagonal());
-            params.relax.goal = tolerance.map_or(0.0, |t| (RELAX_TO * t).min(1.0));
+            params.relax.goal = tolerance.map_or(0.0, relax_goal);
         }
         stages::graph(&self.registry, &params, self.model.base_mesh.as_ref())
     }

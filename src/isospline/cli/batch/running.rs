@@ -24,7 +24,8 @@ impl Patience {
         self.not_before.is_none_or(|then| now() >= then)
     }
 
-    pub(super) fn again(self) -> Self {
+    /// Of a model that is tried again.
+    pub(super) fn again() -> Self {
         Self { not_before: Some(now() + PAUSE) }
     }
 }
@@ -33,7 +34,6 @@ impl Patience {
 #[derive(Debug)]
 pub(super) struct Running {
     pub(super) model: BatchModel,
-    pub(super) patience: Patience,
     child: Child,
     since: Instant,
     is_over_time: bool,
@@ -54,7 +54,6 @@ impl Running {
         out: &Path,
         model: BatchModel,
         threads: u32,
-        patience: Patience,
     ) -> Result<Self, Failure> {
         let logs = out.join(".batch/logs");
         let said = logs.join(format!("{}.jsonl", model.folder));
@@ -70,7 +69,7 @@ impl Running {
         command.stdout(log(&said).map_err(failed)?).stderr(log(&noted).map_err(failed)?);
         let child = command.spawn().map_err(failed)?;
         let (since, stage) = (now(), String::new());
-        Ok(Self { model, patience, child, since, is_over_time: false, said, noted, seen: 0, stage })
+        Ok(Self { model, child, since, is_over_time: false, said, noted, seen: 0, stage })
     }
 
     /// How the run ended, if it has; it is ended after `limit` seconds.
@@ -120,9 +119,10 @@ impl Running {
         // What cannot be read is told later; a line that is not whole is read again.
         if let (Ok(_), Some(end)) = (read, new.rfind('\n')) {
             self.seen += end as u64 + 1;
-            let lines = new[..end].lines().filter_map(|line| serde_json::from_str(line).ok());
+            let mut lines =
+                new[..end].lines().rev().filter_map(|line| serde_json::from_str(line).ok());
             let started = |event: &serde_json::Value| event["event"] == "stage_started";
-            if let Some(event) = lines.filter(started).last() {
+            if let Some(event) = lines.find(started) {
                 event["stage"].as_str().unwrap_or_default().clone_into(&mut self.stage);
             }
         }
