@@ -287,15 +287,14 @@ mod tests {
     use crate::sample;
     use isospline_geometry::TriangleMesh;
 
-    const DENSITIES: [Density; 8] = [
+    const DENSITIES: [Density; 7] = [
         Density::Samples(1),
         Density::Samples(2),
         Density::Samples(3),
         Density::Samples(7),
         Density::Relative(0.02),
         Density::Relative(2e-3),
-        Density::Relative(2e-4),
-        Density::Length(1e-3),
+        Density::Length(1e-2),
     ];
 
     fn mesh(tessellation: &Tessellation<'_>) -> TriangleMesh {

@@ -74,7 +74,7 @@ pub(crate) enum FormatArg {
     Step,
     /// Gmsh mesh of curved triangles, for simulation
     Msh,
-    /// VTK unstructured grid with exact Bézier cells, for ParaView
+    /// VTK unstructured grid with exact Bézier cells
     Vtu,
     /// 3MF with its unit, for printing
     #[value(name = "3mf")]
@@ -87,7 +87,7 @@ pub(crate) enum FormatArg {
     Obj,
     /// Stanford PLY
     Ply,
-    /// BezierView text with exact patches
+    /// Text of the viewer bview, with exact patches
     Bv,
     /// Arrays for numpy: vertices, faces, control points
     Npz,

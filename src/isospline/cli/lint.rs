@@ -64,7 +64,7 @@ fn sound(summary: &StepSummary) -> String {
 }
 
 fn broken(defects: &[StepDefect]) -> String {
-    let mut text: String = defects.iter().map(|defect| format!("FAILED: {defect}\n")).collect();
-    text.push_str("lint FAILED");
-    text
+    let mut lines: Vec<String> = defects.iter().map(|d| format!("FAILED: {d}")).collect();
+    lines.push("lint FAILED".to_owned());
+    lines.join("\n")
 }

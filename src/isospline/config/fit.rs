@@ -19,14 +19,19 @@ pub enum Fit {
 /// Sweeps of a fast fit: further ones gain a factor of about ten and take most of the time.
 const QUICK_SWEEPS: i64 = 2;
 
+/// Iterations of the curves of a fast fit: on deccube of 5000 faces 40 leave no less error.
+const QUICK_ITERATIONS: i64 = 16;
+
 impl Fit {
     /// Puts the parameters of the stages that follow from the fit, where the user wrote none.
     pub(crate) fn fill(self, doc: &mut Document) {
         let values: &[(&str, &str, toml::Value)] = match self {
             Self::Full => &[],
-            Self::Fast => {
-                &[("adapt", "curves", "paper".into()), ("relax", "sweeps", QUICK_SWEEPS.into())]
-            }
+            Self::Fast => &[
+                ("adapt", "curves", "paper".into()),
+                ("network", "iterations", QUICK_ITERATIONS.into()),
+                ("relax", "sweeps", QUICK_SWEEPS.into()),
+            ],
             Self::Paper => {
                 &[("adapt", "curves", "paper".into()), ("network", "method", "paper".into())]
             }
@@ -48,16 +53,16 @@ mod tests {
         let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
         let stages = ModelFile::from_formula("x", &overrides).unwrap().stages;
         let (curves, method) = (stages.adapt.curves, stages.network.method);
-        format!("{curves:?} {method:?} {}", stages.relax.sweeps)
+        format!("{curves:?} {method:?} {} {}", stages.network.iterations, stages.relax.sweeps)
     }
 
     #[test]
     fn a_fit_sets_the_stages_and_what_the_user_wrote_stays() {
-        assert_eq!(chosen(&[]), "Normal Normal 12");
-        assert_eq!(chosen(&["target.fit=paper"]), "Paper Paper 12");
-        assert_eq!(chosen(&["target.fit=full"]), "Normal Normal 12");
-        assert_eq!(chosen(&["target.fit=fast"]), "Paper Normal 2");
+        assert_eq!(chosen(&[]), "Normal Normal 40 12");
+        assert_eq!(chosen(&["target.fit=paper"]), "Paper Paper 40 12");
+        assert_eq!(chosen(&["target.fit=full"]), "Normal Normal 40 12");
+        assert_eq!(chosen(&["target.fit=fast"]), "Paper Normal 16 2");
         let mixed = ["target.fit=full", "relax.sweeps=3", "network.method=paper"];
-        assert_eq!(chosen(&mixed), "Normal Paper 3");
+        assert_eq!(chosen(&mixed), "Normal Paper 40 3");
     }
 }

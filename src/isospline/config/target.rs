@@ -66,7 +66,7 @@ impl TargetTable {
                 "at least 4, the faces of a tetrahedron",
             ));
         }
-        if self.tolerance.is_some_and(|t| !(t >= LEAST_TOLERANCE && t < 1.0)) {
+        if self.tolerance.is_some_and(|t| !(LEAST_TOLERANCE..1.0).contains(&t)) {
             let message = "from 1e-12, where rounding begins, to below 1, of the box diagonal";
             return Err(out_of_range(doc, "target.tolerance", message));
         }
@@ -83,9 +83,11 @@ impl TargetTable {
 pub(crate) fn give_way(doc: &mut Document, overrides: &[String]) {
     let key = |argument: &String| argument.split('=').next().map(|key| key.trim().to_owned());
     let keys: Vec<String> = overrides.iter().filter_map(key).collect();
-    let is_set = |name: &&str| keys.iter().any(|key| *key == format!("target.{name}"));
-    if EXCLUSIVE.iter().any(|name| is_set(&name)) {
-        EXCLUSIVE.iter().for_each(|name| doc.take("target", name));
+    let is_set = |name: &str| keys.iter().any(|key| *key == format!("target.{name}"));
+    if EXCLUSIVE.iter().any(|name| is_set(name)) {
+        for name in EXCLUSIVE {
+            doc.take("target", name);
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use isospline_artifact::StoreError;
 use isospline_artifact::kinds::BaseMesh;
 use isospline_check::{CheckParams, CheckReport};
 use isospline_pipeline::{Event, Graph, Pipeline, RunError, RunOptions, RunReport, Scene};
+use isospline_stage::Diagnosis;
 use serde::{Deserialize, Serialize};
 
 /// Name of the note of the rounds.
@@ -222,10 +223,10 @@ pub(crate) fn refused(error: RunError, rounds: &[Round]) -> Result<Found, RunErr
     if error.diagnosis().is_some_and(|d| d.code() == TOO_MANY) && !rounds.is_empty() {
         return Ok(Found::TooMany);
     }
-    let Some(code) = error.diagnosis().map(|d| d.code()).filter(|code| TOO_FEW.contains(code))
-    else {
+    let code = error.diagnosis().map_or("", Diagnosis::code);
+    if !TOO_FEW.contains(&code) {
         return Err(error);
-    };
+    }
     let earlier = rounds.iter().filter(|r| matches!(r.found, Found::Refused { .. })).count();
     if earlier + 1 >= MOST_REFUSALS {
         return Err(error);
