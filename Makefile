@@ -12,7 +12,7 @@ DRAW_CUBE = $(ISOSPLINE) render out/deccube --size 620x560 --view 58,27
 DRAW_STRIPES = $(ISOSPLINE) render out/pictures/dodecahedron --size 560x520 --view -50,40 --stripes 18
 
 help: ## print this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 build: ## build the release binary, target/release/isospline
 	$(CARGO) build --release -p isospline
@@ -23,8 +23,9 @@ deccube: build ## convert the decorative cube, check it, write out/deccube/deccu
 	$(ISOSPLINE) export out/deccube --format vtu
 
 paper: build ## convert all models of the paper and print its Table 3 with our figures
-	@for model in $(PAPER); do $(ISOSPLINE) run configs/$$model.toml || exit $$?; done
-	$(CARGO) run --release -q -p isospline --example paper_table -- $(PAPER:%=out/%)
+	@for model in $(PAPER); do $(ISOSPLINE) run configs/$$model.toml --set target.fit=paper \
+		--out out/paper/$$model || exit $$?; done
+	$(CARGO) run --release -q -p isospline --example paper_table -- $(PAPER:%=out/paper/%)
 
 test: lint unit docs readers ## format and lint checks, all tests, docs, foreign readers
 
@@ -55,6 +56,13 @@ cluster: build ## run emitted scripts on Slurm (as root) and snakemake, where th
 	rm -rf out/cluster
 	bash tests/cluster/slurm.sh $(ISOSPLINE) out/cluster/slurm
 	bash tests/cluster/snakemake.sh $(ISOSPLINE) out/cluster/snakemake
+
+bench-peers: build ## the decorative cube to 1e-3 .. 1e-8, beside marching cubes and fidget (needs Python)
+	test -x .venv/bin/python || python3 -m venv .venv
+	.venv/bin/pip install -q numpy scikit-image
+	$(CARGO) build --release -q --manifest-path peers/Cargo.toml --target-dir $(TARGET)/peers
+	.venv/bin/python peers/compare.py $(ISOSPLINE) $(TARGET)/peers/release/isospline-peers \
+		configs/deccube.toml out/peers
 
 reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
 	$(CARGO) run --release -q -p isospline-tests --bin scoreboard
