@@ -1,6 +1,6 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench library-bench cluster reliability golden pictures docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench bench-peers library-bench cluster reliability golden pictures docs clean
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)

@@ -108,7 +108,7 @@ fn a_batch_that_is_killed_loses_no_model_and_does_none_twice() {
     let args = [&["batch", "library", "--out", "out"], &QUICK[..], &PAPER_FIT[1..]].concat();
     let mut child = sandbox.command(&args).stderr(Stdio::null()).spawn().unwrap();
     let lines = || std::fs::read(sandbox.path("out/summary.jsonl")).unwrap_or_default();
-    let n_lines = || lines().iter().filter(|&&byte| byte == b'\n').count();
+    let n_lines = || String::from_utf8_lossy(&lines()).lines().count();
     while n_lines() < 4 && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(2));
     }
