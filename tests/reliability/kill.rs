@@ -23,7 +23,10 @@ pub(crate) fn chunked() -> Sample {
         value.map(|value| format!("{key} = {value}\n")).unwrap_or_default()
     };
     let keys: String = ["formula", "level", "box", "inside", "parameters"].map(value).concat();
-    Sample::of(&format!("[model]\n{keys}base_mesh = {:?}\n", mesh.display().to_string()))
+    Sample::of(&format!(
+        "[model]\n{keys}base_mesh = {:?}\n[target]\nfit = \"paper\"\n",
+        mesh.display().to_string()
+    ))
 }
 
 /// Calls at which the program is killed.
