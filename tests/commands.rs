@@ -178,13 +178,13 @@ fn every_format_is_written_where_it_is_asked_for() {
 fn lint_tells_a_sound_file_from_a_broken_one(sandbox: &Sandbox) {
     let sound = sandbox.succeeds(&["lint", "out/torus.step"]).stdout;
     assert!(sound.contains("genus 1") && sound.contains("lint passed"), "{sound}");
-    let text = std::fs::read_to_string(sandbox.path("out/torus.step")).unwrap();
+    let text = std::fs::read_to_string(sandbox.path("out/torus.step")).expect("the export is text");
     sandbox.write("broken.step", text.replacen(".T.);\n", ".F.);\n", 1));
     let broken = sandbox.isospline(&["lint", "broken.step", "--json"]);
     assert_eq!(broken.code, 1, "{}", broken.stderr);
-    let found: serde_json::Value = serde_json::from_str(&broken.stdout).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&broken.stdout).expect("JSON");
     assert_eq!(found["pass"], false);
-    assert!(!found["defects"].as_array().unwrap().is_empty());
+    assert!(!found["defects"].as_array().expect("a list").is_empty());
 }
 
 #[test]

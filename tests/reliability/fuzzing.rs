@@ -98,7 +98,8 @@ fn more(target: &str, sample: &Sample) -> Vec<Vec<u8>> {
     match target {
         "config" => {
             let configs = std::fs::read_dir(crate::root().join("configs")).expect("configs");
-            let mut paths: Vec<_> = configs.map(|e| e.expect("an entry").path()).collect();
+            let paths = configs.map(|entry| entry.expect("an entry").path());
+            let mut paths: Vec<_> = paths.filter(|path| path.is_file()).collect();
             paths.sort();
             paths.into_iter().map(read).collect()
         }
