@@ -9,7 +9,7 @@ use std::io::{BufWriter, Write};
 use std::time::Instant;
 
 /// Half the side of the cube that is meshed; fidget's own reaches from -1 to 1.
-const HALF_SIDE: f64 = 1.18;
+const HALF_SIDE: f32 = 1.18;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().collect();
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     out.write_all(&u64::try_from(mesh.vertices.len())?.to_le_bytes())?;
     for vertex in &mesh.vertices {
         for coordinate in vertex.iter() {
-            out.write_all(&(f64::from(*coordinate) * HALF_SIDE).to_le_bytes())?;
+            out.write_all(&(f64::from(*coordinate) * f64::from(HALF_SIDE)).to_le_bytes())?;
         }
     }
     for corner in mesh.triangles.iter().flat_map(|t| t.iter()) {
