@@ -40,7 +40,7 @@ unit:
 		$(CARGO) test --workspace --no-fail-fast; \
 	fi
 
-readers: build ## read the exports with vtk, trimesh and numpy
+readers: build ## read the exports with OCCT, gmsh, vtk, trimesh, manifold3d, lib3mf and others
 	bash tests/readers/run.sh
 
 bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50k faces
