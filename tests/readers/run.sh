@@ -29,6 +29,7 @@ needs() {
         tolerance) echo "vtk vtkmodules.vtkIOPLY" ;;
         printing) echo "lib3mf lib3mf" ;;
         schema) echo "jsonschema jsonschema tomllib" ;;
+        glb_picture) echo "numpy numpy" ;;
     esac
 }
 
@@ -42,11 +43,13 @@ install() {
         done <"$here/requirements.txt"
 }
 
-install_gltf_validator() {
+install_node_readers() {
     command -v npm >/dev/null || return 0
     npm install --silent --no-audit --no-fund --prefix "$node_home" \
-        gltf-validator@2.0.0-dev.3.10 >/dev/null 2>&1 || true
+        gltf-validator@2.0.0-dev.3.10 three@0.187.0 >/dev/null 2>&1 || true
 }
+
+has_node_reader() { [ -d "$node_home/node_modules/$1" ]; }
 
 make_exports() {
     "${CARGO:-cargo}" run --quiet --release -p isospline-export --example sample_exports -- "$1"
@@ -79,7 +82,7 @@ for script in $scripts; do
         "$python" -c "import $module" >/dev/null 2>&1 || { install; break 2; }
     done
 done
-[ -d "$node_home/node_modules/gltf-validator" ] || install_gltf_validator
+{ has_node_reader gltf-validator && has_node_reader three; } || install_node_readers
 dir=${1:-}
 if [ -z "$dir" ]; then
     dir=$(mktemp -d)
@@ -88,8 +91,17 @@ if [ -z "$dir" ]; then
     make_exports "$dir"
 fi
 for script in $scripts; do read_with "$script"; done
-if [ -d "$node_home/node_modules/gltf-validator" ]; then
+if has_node_reader gltf-validator; then
     NODE_PATH="$node_home/node_modules" node "$here/gltf.js" "$dir"
 else
     skip gltf-validator "npm cannot install it"
+fi
+browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
+if [ -z "$browser" ]; then
+    skip three.js "no chromium"
+elif has_node_reader three; then
+    NODE_PATH="$node_home/node_modules" node "$here/glb_draw.js" "$dir" "$browser"
+    read_with glb_picture
+else
+    skip three.js "npm cannot install it"
 fi
