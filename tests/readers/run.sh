@@ -21,7 +21,7 @@ skip() {
 # What a script needs, and what its readers are called.
 needs() {
     case $1 in
-        npz) echo "numpy numpy" ;;
+        npz | bv | glb_picture) echo "numpy numpy" ;;
         vtu) echo "vtk vtkmodules.vtkIOXML" ;;
         meshes) echo "trimesh,manifold3d,vtk trimesh manifold3d vtkmodules.vtkFiltersCore" ;;
         step) echo "occt OCP.STEPControl" ;;
@@ -29,7 +29,6 @@ needs() {
         tolerance) echo "vtk vtkmodules.vtkIOPLY" ;;
         printing) echo "lib3mf lib3mf" ;;
         schema) echo "jsonschema jsonschema tomllib" ;;
-        glb_picture) echo "numpy numpy" ;;
     esac
 }
 
@@ -75,7 +74,7 @@ read_with() {
     "$python" "$here/$script.py" "$dir"
 }
 
-scripts="npz vtu tolerance meshes printing step volume_mesh msh schema"
+scripts="npz bv vtu tolerance meshes printing step volume_mesh msh schema"
 for script in $scripts; do
     read -r _ modules <<<"$(needs "$script")"
     for module in $modules; do
