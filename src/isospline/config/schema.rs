@@ -4,6 +4,7 @@
 //! nobody knows, types and ranges are what it takes of values put to it, and sentences and
 //! defaults stand in `configs/reference.toml`. So the schema cannot say what the reader does not.
 
+mod exclusion;
 mod range;
 mod reference;
 
@@ -42,9 +43,14 @@ pub fn schema() -> Value {
 
 /// What the reader says to one value in a model that is otherwise sound.
 fn verdict(table: &str, key: &str, value: toml::Value) -> Result<(), ConfigError> {
+    verdict_of(|doc| doc.put(table, key, value))
+}
+
+/// What the reader says to a sound model to which something is added.
+fn verdict_of(add: impl FnOnce(&mut Document)) -> Result<(), ConfigError> {
     let mut doc = Document::default();
     doc.put("model", "formula", "x");
-    doc.put(table, key, value);
+    add(&mut doc);
     ModelFile::from_document(&doc).map(|_| ())
 }
 
@@ -93,8 +99,13 @@ fn table_schema(table: &str, reference: &Reference) -> Value {
             properties.insert(key, schema);
         }
     }
+    let keys: Vec<String> = properties.keys().cloned().collect();
     let mut schema =
         json!({ "type": "object", "additionalProperties": false, "properties": properties });
+    let exclusions = exclusion::exclusions(table, &keys);
+    if !exclusions.is_empty() {
+        schema["allOf"] = exclusions.into();
+    }
     reference.describe(table, &mut schema);
     schema
 }
@@ -195,6 +206,10 @@ mod tests {
             ("[target]\ntolerance = 0.5", true),
             ("[target]\ntolerance = 1.0", false),
             ("[target]\ntolerance = 0", false),
+            ("[target]\nfaces = 9\ntolerance = 1e-6", false),
+            ("[target]\nfaces = 9\ntolerance_abs = 1e-6", false),
+            ("[target]\ntolerance = 1e-6\ntolerance_abs = 1e-6", false),
+            ("[target]\ntolerance_abs = 1e-6\nfit = \"paper\"", true),
             ("[target]\nfit = \"fast\"", true),
             ("[target]\nfit = \"slow\"", false),
             ("[check]\nsame_bits = false", true),

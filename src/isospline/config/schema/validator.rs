@@ -23,6 +23,8 @@ pub(super) fn refusal(schema: &Value, value: &Value) -> Option<String> {
             let fits = all.iter().any(|form| refusal(form, value).is_none());
             (!fits).then(|| format!("{value} fits none of {limit}"))
         }
+        "allOf" => limit.as_array().unwrap().iter().find_map(|form| refusal(form, value)),
+        "not" => refusal(limit, value).is_none().then(|| format!("{value} fits {limit}")),
         keyword if known(keyword) => None,
         keyword => (!holds(keyword, limit, value)).then(|| format!("{value}: {keyword} {limit}")),
     })
