@@ -9,7 +9,7 @@
     reason = "the interpreter must be compiled inside the function that enables AVX2"
 )]
 
-use crate::instruction_set;
+use crate::instruction_set::InstructionSet;
 use crate::operation::{self, BinaryOp, UnaryOp};
 use crate::tape::{Instruction, Op, Tape};
 use isospline_geometry::Vec3;
@@ -88,7 +88,7 @@ fn block<const N: usize, const K: usize, T>(
 
 #[cfg(target_arch = "x86_64")]
 fn run<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]]) {
-    if instruction_set::has_avx2() {
+    if InstructionSet::best() >= InstructionSet::Avx2 {
         #[expect(unsafe_code, reason = "calls code compiled for AVX2: half the time of SSE2")]
         // SAFETY: the processor has AVX2, as checked in the line above.
         unsafe {

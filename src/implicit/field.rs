@@ -1,6 +1,6 @@
 //! What a scalar field answers.
 
-use crate::{Interval, IntervalBend, IntervalJet};
+use crate::{Interval, IntervalJet};
 use isospline_geometry::{Mat3, Vec3};
 use std::sync::Arc;
 
@@ -11,6 +11,9 @@ pub type SymMat3 = [f64; 6];
 pub fn full(s: &SymMat3) -> Mat3 {
     Mat3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5])
 }
+
+/// Enclosures of second derivatives over a box, in the places of a [`SymMat3`].
+pub type HessianIntervals = [Interval; 6];
 
 /// Value and gradient at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,11 +71,10 @@ pub trait Field: Send + Sync {
         }
     }
 
-    /// Enclosures of the second derivatives over many boxes, with value and gradient in their
-    /// middles: `grad f(x)` lies in `middle + hessian (x - c)` for x in the box around c. `None`
-    /// where that is not known: for fields without intervals, with kinks, or too long to be worth
-    /// it.
-    fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {
+    /// Enclosures of the second derivatives over many boxes: for x and c in a box, `grad f(x)` lies
+    /// in `grad f(c) + hessian (x - c)`. `None` where that is not known: for fields without
+    /// intervals, with kinks, or too long to be worth it; for all boxes then.
+    fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
         assert_eq!(domains.len(), out.len(), "one result a box");
         out.fill(None);
     }
@@ -192,11 +194,10 @@ impl<F: Field> Field for Oriented<F> {
         self.inner.kinks_between(a, b)
     }
 
-    fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {
-        self.inner.bend_enclosures(domains, out);
-        for bend in out.iter_mut().flatten() {
-            bend.middle = self.turned(bend.middle);
-            bend.hessian = bend.hessian.map(|h| self.turn(h));
+    fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
+        self.inner.hessian_enclosures(domains, out);
+        for hessian in out.iter_mut().flatten() {
+            *hessian = hessian.map(|h| self.turn(h));
         }
     }
 }
@@ -243,12 +244,12 @@ macro_rules! forward_field {
             ) {
                 (**self).gradient_enclosures(domains, out);
             }
-            fn bend_enclosures(
+            fn hessian_enclosures(
                 &self,
                 domains: &[[Interval; 3]],
-                out: &mut [Option<IntervalBend>],
+                out: &mut [Option<HessianIntervals>],
             ) {
-                (**self).bend_enclosures(domains, out);
+                (**self).hessian_enclosures(domains, out);
             }
             fn kinks_between(&self, a: Vec3, b: Vec3) -> Vec<&'static str> {
                 (**self).kinks_between(a, b)

@@ -34,7 +34,7 @@ use crate::interval_lanes::enclose_all;
 use crate::kinks;
 use crate::lowering::{self, Target};
 use crate::tape::Tape;
-use crate::{Field, Interval, IntervalBend, IntervalJet, Jet1, Jet2};
+use crate::{Field, HessianIntervals, Interval, IntervalJet, Jet1, Jet2};
 use crate::{canonical, derivative, parser};
 use isospline_geometry::Vec3;
 use std::collections::BTreeMap;
@@ -201,23 +201,9 @@ impl Field for Formula {
         kinks::between(&self.dag, self.root, a, b)
     }
 
-    fn bend_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalBend>]) {
+    fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
         let Some(tape) = self.hessian_interval_tape() else { return out.fill(None) };
-        let middles: Vec<_> =
-            domains.iter().map(|d| d.map(|side| Interval::point(side.midpoint()))).collect();
-        let zero = IntervalJet { value: Interval::ZERO, gradient: [Interval::ZERO; 3] };
-        let mut jets = vec![zero; domains.len()];
-        let slopes = self.gradient_interval_tape();
-        enclose_all::<4, _>(slopes, &middles, &mut jets, |[value, x, y, z]| IntervalJet {
-            value,
-            gradient: [x, y, z],
-        });
-        enclose_all::<6, _>(tape, domains, out, |hessian| {
-            Some(IntervalBend { middle: zero, hessian })
-        });
-        for (bend, middle) in out.iter_mut().flatten().zip(jets) {
-            bend.middle = middle;
-        }
+        enclose_all::<6, _>(tape, domains, out, Some);
     }
 }
 
@@ -229,9 +215,9 @@ mod tests {
     fn formulas_with_kinks_have_no_form_of_second_order_and_blends_have_one() {
         let has_bends = |text: &str| {
             let field = Formula::parse(text, &BTreeMap::new()).unwrap();
-            let mut bends = [None];
-            field.bend_enclosures(&[[Interval::new(0.5, 1.0); 3]], &mut bends);
-            bends[0].is_some()
+            let mut hessians = [None];
+            field.hessian_enclosures(&[[Interval::new(0.5, 1.0); 3]], &mut hessians);
+            hessians[0].is_some()
         };
         for text in ["abs(x) - 1", "max(x, y)", "mod(x, 2) + z", "atan2(y, x)", "x^y", "sign(z)"] {
             assert!(!has_bends(text), "{text}");

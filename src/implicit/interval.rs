@@ -25,15 +25,6 @@ pub struct IntervalJet {
     pub gradient: [Interval; 3],
 }
 
-/// How a field bends over a box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IntervalBend {
-    /// Enclosures of value and gradient in the middle of the box.
-    pub middle: IntervalJet,
-    /// Enclosure of the second derivatives over the box, `[xx, xy, xz, yy, yz, zz]`.
-    pub hessian: [Interval; 6],
-}
-
 impl Interval {
     /// Every real number.
     pub const ENTIRE: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };

@@ -31,12 +31,12 @@ mod tape;
 
 pub use bounds::{BoundsError, auto_box};
 pub use closure::ClosureField;
-pub use field::{Field, Jet1, Jet2, Oriented, SymMat3};
+pub use field::{Field, HessianIntervals, Jet1, Jet2, Oriented, SymMat3};
 pub use foreign::{ForeignError, ForeignErrorKind, ForeignFormat, ForeignModel};
 pub use formula::Formula;
 pub use formula_error::{FormulaError, FormulaErrorKind};
 pub use functions::{CONSTANTS, FUNCTIONS, Function, VARIABLES};
 pub use inside::{Inside, InsideError, Side, resolve_inside};
 #[doc(hidden)]
-pub use instruction_set::{has_avx2, use_plain_code};
-pub use interval::{Interval, IntervalBend, IntervalJet};
+pub use instruction_set::{InstructionSet, use_at_most};
+pub use interval::{Interval, IntervalJet};

@@ -9,12 +9,13 @@
 //!    form shrinks with the square of the box, so most cells pass whole.
 //!
 //! A box that fails both is halved along the axis that widens the enclosure most, within a budget;
-//! what still fails is refined. The crate's page proves what follows when all pass.
+//! H over a box also holds over its halves, which therefore need but a look at their middles. What
+//! still fails is refined. The crate's page proves what follows when all pass.
 
 use crate::complex::{Complex, Tetrahedron};
-use crate::interpolant::{HESSIAN_ROWS, Interpolant};
+use crate::interpolant::{Bend, HESSIAN_ROWS, Interpolant};
 use isospline_geometry::Vec3;
-use isospline_implicit::{Field, Interval, IntervalBend, IntervalJet, Jet1};
+use isospline_implicit::{Field, HessianIntervals, Interval, IntervalJet, Jet1};
 
 /// Boxes that one cube may take. Expanded polynomials of high degree (the double torus) need a few
 /// hundred where their gradient is small; more only delays refinement where it is due.
@@ -26,7 +27,12 @@ const MOST_HALVINGS: u32 = 15;
 const HOPELESS_COSINE: f64 = 0.25;
 /// Boxes that are looked at together at least, if there are as many: what the field encloses at
 /// a time.
-const LEAST_BATCH: usize = 16;
+const LEAST_BATCH: usize = 64;
+/// Halvings after which a box gets second derivatives of its own. With 1 the decorative cube takes
+/// a half more of them, with 3 a tenth more boxes.
+const OLD: u32 = 2;
+/// Room for boxes of a test: depth first search rarely needs more.
+const USUAL_PARTS: usize = 16;
 
 /// A cube and tetrahedra in it.
 #[derive(Clone, Debug)]
@@ -86,6 +92,15 @@ struct Part {
     open: u64,
     /// How often the cube was halved along each axis.
     halvings: [u32; 3],
+    /// Second derivatives over this box or one around it, if they are known.
+    bend: Option<Inherited>,
+}
+
+/// Enclosures of second derivatives, and how often the box that they hold over was halved since.
+#[derive(Clone, Copy)]
+struct Inherited {
+    hessian: HessianIntervals,
+    age: u32,
 }
 
 /// A part with its test.
@@ -106,75 +121,111 @@ fn next_batch(tests: &mut [Test<'_>]) -> Vec<Entry> {
 /// Looks at boxes; what fails is halved and put back.
 fn look(field: &dyn Field, tests: &mut [Test<'_>], mut batch: Vec<Entry>) {
     batch.retain_mut(|(i, part)| tests[*i].admits(part));
-    let mut jets = vec![None; batch.len()];
-    let domains: Vec<_> = batch.iter().map(|(_, part)| part.domain).collect();
-    field.gradient_enclosures(&domains, &mut jets);
-    let mut open: Vec<(Entry, IntervalJet)> = Vec::new();
-    for ((i, mut part), jet) in batch.into_iter().zip(jets) {
-        let Some(jet) = jet else {
-            tests[i].failed |= part.open;
-            continue;
-        };
-        part.keep(&tests[i], |l, part| {
-            !l.is_transversal(&jet.gradient) && !l.has_sign_of(jet.value, part.middle, part.radius)
-        });
-        if part.open != 0 {
-            open.push(((i, part), jet));
-        }
+    let (bent, new): (Vec<_>, Vec<_>) = batch.into_iter().partition(|(_, p)| p.bend.is_some());
+    look_along_slopes(field, tests, bent);
+    look_at_new(field, tests, new);
+}
+
+/// Boxes over which no second derivatives are known: whole cubes, or all if the field has none.
+fn look_at_new(field: &dyn Field, tests: &mut [Test<'_>], batch: Vec<Entry>) {
+    let mut open = with_jets(field, tests, batch, |part| part.domain);
+    keep_unproved(tests, &mut open, |part, test, jet| part.look(test, jet));
+    let mut bent: Vec<Entry> = open.iter().map(|(entry, _)| *entry).collect();
+    if renew(field, bent.iter_mut().map(|(_, part)| part).collect()) {
+        return look_along_slopes(field, tests, bent);
     }
     look_closer(field, tests, &mut open);
-    let Some(axes) = look_along_slopes(field, tests, &mut open) else {
-        measure_gains(field, tests, &open);
-        for ((i, part), _) in open.iter().rev() {
-            let axis = tests[*i].best_axis(part);
-            tests[*i].halve(part, axis);
-        }
-        return;
-    };
-    for (((i, part), _), axis) in open.iter().zip(axes).rev() {
+    measure_gains(field, tests, &open);
+    for ((i, part), _) in open.iter().rev() {
+        let axis = tests[*i].best_axis(part);
         tests[*i].halve(part, axis);
     }
 }
 
-/// Passes those that the forms of second order prove; for each that is left the axis along which
-/// they are least certain. `None` if the field has no enclosures of second derivatives.
-fn look_along_slopes(
-    field: &dyn Field,
-    tests: &[Test<'_>],
-    open: &mut Vec<(Entry, IntervalJet)>,
-) -> Option<Vec<usize>> {
-    let domains: Vec<_> = open.iter().map(|((_, part), _)| part.domain).collect();
-    let mut bends = vec![None; domains.len()];
-    field.bend_enclosures(&domains, &mut bends);
-    let bends = bends.into_iter().collect::<Option<Vec<IntervalBend>>>()?;
-    let mut axes = Vec::with_capacity(open.len());
-    let mut rows = bends.iter();
-    open.retain_mut(|((i, part), _)| {
-        let bend = rows.next().expect("invariant: a row each box");
-        let value = taylor_form(bend, part);
-        part.keep(&tests[*i], |l, part| {
-            !l.has_sign_of(value, part.middle, part.radius)
-                && !l.is_transversal_along(bend, &part.radius)
-        });
-        if part.open != 0 {
-            axes.push(tests[*i].loosest_axis(part, bend));
-        }
-        part.open != 0
-    });
-    Some(axes)
+/// Passes those that the forms of second order prove, first by the second derivatives over the
+/// boxes that they were halved from, which cost nothing: the form needs but the middle.
+fn look_along_slopes(field: &dyn Field, tests: &mut [Test<'_>], batch: Vec<Entry>) {
+    let middle = |part: &Part| [0, 1, 2].map(|axis| Interval::point(part.middle[axis]));
+    let mut open = with_jets(field, tests, batch, middle);
+    keep_unproved(tests, &mut open, Part::look_along);
+    look_at_old(field, tests, &mut open);
+    for ((i, part), middle) in open.iter().rev() {
+        let axis = tests[*i].loosest_axis(part, middle);
+        tests[*i].halve(part, axis);
+    }
 }
 
-/// `f(m) + grad f(m) . d + d . H d / 2`, if bounded.
-fn taylor_form(bend: &IntervalBend, part: &Part) -> Interval {
-    let IntervalJet { value: at_middle, gradient } = bend.middle;
+/// Looks anew at boxes whose second derivatives are too old, by their own.
+fn look_at_old(field: &dyn Field, tests: &mut [Test<'_>], open: &mut Vec<(Entry, IntervalJet)>) {
+    let is_old = |part: &Part| part.bend.is_some_and(|bend| bend.age >= OLD);
+    let (old, young) = std::mem::take(open).into_iter().partition(|((_, part), _)| is_old(part));
+    let (entries, middles): (Vec<Entry>, Vec<IntervalJet>) = Vec::into_iter(old).unzip();
+    // Plain enclosures too: where second derivatives vary much they are better.
+    let mut old = with_jets(field, tests, entries, |part| part.domain);
+    for (((i, part), jet), middle) in old.iter_mut().zip(middles) {
+        part.look(&tests[*i], jet);
+        *jet = middle;
+    }
+    old.retain(|((_, part), _)| part.open != 0);
+    renew(field, old.iter_mut().map(|((_, part), _)| part).collect());
+    keep_unproved(tests, &mut old, Part::look_along);
+    *open = young;
+    open.extend(old);
+}
+
+/// Boxes with what the field encloses over parts of them; those where it answers nothing fail.
+fn with_jets(
+    field: &dyn Field,
+    tests: &mut [Test<'_>],
+    batch: Vec<Entry>,
+    domain: impl Fn(&Part) -> [Interval; 3],
+) -> Vec<(Entry, IntervalJet)> {
+    let domains: Vec<_> = batch.iter().map(|(_, part)| domain(part)).collect();
+    let mut jets = vec![None; domains.len()];
+    field.gradient_enclosures(&domains, &mut jets);
+    let mut known = Vec::with_capacity(batch.len());
+    for ((i, part), jet) in batch.into_iter().zip(jets) {
+        match jet {
+            Some(jet) => known.push(((i, part), jet)),
+            None => tests[i].failed |= part.open,
+        }
+    }
+    known
+}
+
+/// Gives boxes their own second derivatives; false if the field has none.
+fn renew(field: &dyn Field, parts: Vec<&mut Part>) -> bool {
+    let domains: Vec<_> = parts.iter().map(|part| part.domain).collect();
+    let mut hessians = vec![None; domains.len()];
+    field.hessian_enclosures(&domains, &mut hessians);
+    let has_all = hessians.iter().all(Option::is_some);
+    for (part, hessian) in parts.into_iter().zip(hessians) {
+        part.bend = hessian.map(|hessian| Inherited { hessian, age: 0 });
+    }
+    has_all
+}
+
+/// Looks at boxes and drops those on which all tetrahedra pass.
+fn keep_unproved(
+    tests: &[Test<'_>],
+    open: &mut Vec<(Entry, IntervalJet)>,
+    look: impl Fn(&mut Part, &Test<'_>, &IntervalJet),
+) {
+    open.retain_mut(|((i, part), jet)| {
+        look(part, &tests[*i], jet);
+        part.open != 0
+    });
+}
+
+/// `f(m) + grad f(m) . d + d . H d / 2` with H of `bend`, if bounded.
+fn taylor_form(middle: &IntervalJet, hessian: &HessianIntervals, r: &Vec3) -> Interval {
     let size = |i: &Interval| i.lo.abs().max(i.hi.abs());
-    let r = part.radius;
-    let curved =
-        |k: usize| (0..3).map(|j| size(&bend.hessian[HESSIAN_ROWS[k][j]]) * r[j]).sum::<f64>();
-    let spread: f64 = (0..3).map(|k| r[k] * (size(&gradient[k]) + 0.5 * curved(k))).sum();
+    let sizes = hessian.each_ref().map(size);
+    let curved = |k: usize| (0..3).map(|j| sizes[HESSIAN_ROWS[k][j]] * r[j]).sum::<f64>();
+    let spread: f64 = (0..3).map(|k| r[k] * (size(&middle.gradient[k]) + 0.5 * curved(k))).sum();
     let spread = spread * (1.0 + 1e-12);
-    let form =
-        Interval::new((at_middle.lo - spread).next_down(), (at_middle.hi + spread).next_up());
+    let value = middle.value;
+    let form = Interval::new((value.lo - spread).next_down(), (value.hi + spread).next_up());
     if form.lo.is_finite() && form.hi.is_finite() { form } else { Interval::ENTIRE }
 }
 
@@ -243,7 +294,8 @@ impl<'a> Test<'a> {
         let interpolants: Vec<_> = tetrahedra.iter().map(|t| Interpolant::of(complex, t)).collect();
         let failed = hopeless(field, &interpolants);
         let open = set(0..interpolants.len()) & !failed;
-        let parts = vec![Part::new(cube, open, [0; 3])];
+        let mut parts = Vec::with_capacity(USUAL_PARTS);
+        parts.push(Part::new(cube, open, [0; 3], None));
         Self { tetrahedra, interpolants, failed, parts, boxes: MOST_BOXES, gains: [0.0; 3] }
     }
 
@@ -268,13 +320,16 @@ impl<'a> Test<'a> {
         axis.expect("invariant: three axes")
     }
 
-    /// The axis along which the slopes of `grad L . grad f` spread most over the box. A hundredth
-    /// keeps long axes in play, since the sign of f needs them too.
-    fn loosest_axis(&self, part: &Part, bend: &IntervalBend) -> usize {
-        let spreads: Vec3 =
-            members(part.open).map(|l| self.interpolants[l].spreads(bend, &part.radius)).sum();
-        let share = 0.01 * (spreads.x + spreads.y + spreads.z) / part.radius.max();
-        let score = spreads + share * part.radius;
+    /// The axis along which the slopes of `grad L . grad f` spread most over the box; the longest
+    /// where that is not known. A hundredth keeps long axes in play, since the sign of f needs them
+    /// too.
+    fn loosest_axis(&self, part: &Part, middle: &IntervalJet) -> usize {
+        let bend = part.bend(middle);
+        let spreads = |bend| members(part.open).map(|l| self.interpolants[l].spreads(&bend)).sum();
+        let spreads: Vec3 = bend.map_or_else(Vec3::zeros, spreads);
+        let all = spreads.x + spreads.y + spreads.z;
+        let share = 0.01 * all / part.radius.max();
+        let score = if all.is_finite() { spreads + share * part.radius } else { part.radius };
         (0..3).max_by(|&a, &b| score[a].total_cmp(&score[b])).expect("invariant: three axes")
     }
 
@@ -289,15 +344,36 @@ impl<'a> Test<'a> {
         let (mut lower, mut upper) = (part.domain, part.domain);
         lower[axis].hi = part.middle[axis];
         upper[axis].lo = part.middle[axis];
-        self.parts.extend([upper, lower].map(|half| Part::new(half, part.open, deeper)));
+        let bend = part.bend.map(|bend| Inherited { age: bend.age + 1, ..bend });
+        self.parts.extend([upper, lower].map(|half| Part::new(half, part.open, deeper, bend)));
     }
 }
 
 impl Part {
-    fn new(domain: [Interval; 3], open: u64, halvings: [u32; 3]) -> Self {
+    fn new(domain: [Interval; 3], open: u64, halvings: [u32; 3], bend: Option<Inherited>) -> Self {
         let middle = domain.map(|i| f64::midpoint(i.lo, i.hi));
         let radius = [0, 1, 2].map(|k| (domain[k].hi - middle[k]).max(middle[k] - domain[k].lo));
-        Self { domain, middle: middle.into(), radius: radius.into(), open, halvings }
+        Self { domain, middle: middle.into(), radius: radius.into(), open, halvings, bend }
+    }
+
+    fn bend(&self, middle: &IntervalJet) -> Option<Bend> {
+        self.bend.map(|bend| Bend::new(&middle.gradient, &bend.hessian, &self.radius))
+    }
+
+    /// Passes what enclosures over the box prove.
+    fn look(&mut self, test: &Test<'_>, jet: &IntervalJet) {
+        self.keep(test, |l, part| {
+            !l.is_transversal(&jet.gradient) && !l.has_sign_of(jet.value, part.middle, part.radius)
+        });
+    }
+
+    /// Passes what enclosures in the middle and the second derivatives prove.
+    fn look_along(&mut self, test: &Test<'_>, middle: &IntervalJet) {
+        let Some((inherited, bend)) = self.bend.zip(self.bend(middle)) else { return };
+        let value = taylor_form(middle, &inherited.hessian, &self.radius);
+        self.keep(test, |l, part| {
+            !l.has_sign_of(value, part.middle, part.radius) && !l.is_transversal_along(&bend)
+        });
     }
 
     /// Leaves those open that `is_open`.

@@ -2,13 +2,42 @@
 
 use crate::complex::{Complex, EDGES, Tetrahedron};
 use isospline_geometry::Vec3;
-use isospline_implicit::{Interval, IntervalBend};
+use isospline_implicit::{HessianIntervals, Interval};
 
 /// Margin for the rounding of the interpolant, relative to the terms that are summed.
 const ROUNDING: f64 = 1e-10;
 
 /// Places of the rows of a symmetric matrix in `[xx, xy, xz, yy, yz, zz]`.
 pub(crate) const HESSIAN_ROWS: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+
+/// `grad f(m) + H d` for `|d| <= radius` by components, m the middle of a box: what all
+/// tetrahedra there share of the test of second order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bend {
+    /// Middle and half width of `grad f(m)`.
+    slope: [Vec3; 2],
+    /// Middles and half widths of the columns of `H` times the radius of their axis.
+    turns: [[Vec3; 2]; 3],
+    /// Size of the terms of each component.
+    size: Vec3,
+}
+
+impl Bend {
+    /// From enclosures of `grad f(m)` and of the second derivatives over the box.
+    pub(crate) fn new(slope: &[Interval; 3], hessian: &HessianIntervals, radius: &Vec3) -> Self {
+        let split = |i: &Interval| [0.5 * (i.lo + i.hi), 0.5 * (i.hi - i.lo)];
+        let column = |k: usize| {
+            let entries =
+                HESSIAN_ROWS[k].map(|at| split(&hessian[at]).map(|part| part * radius[k]));
+            [0, 1].map(|part| Vec3::from(entries.map(|entry| entry[part])))
+        };
+        let turns = [0, 1, 2].map(column);
+        let slopes = [0, 1, 2].map(|k| split(&slope[k]));
+        let slope = [0, 1].map(|part| Vec3::from(slopes.map(|slope| slope[part])));
+        let sizes = [slope].iter().chain(&turns).map(|[middle, half]| middle.abs() + half).sum();
+        Self { slope, turns, size: sizes }
+    }
+}
 
 /// The linear interpolant L of the node values on a tetrahedron T.
 #[derive(Clone, Copy, Debug)]
@@ -58,38 +87,22 @@ impl Interpolant {
         least > ROUNDING * size && enclosure.iter().all(|i| i.lo.is_finite() && i.hi.is_finite())
     }
 
-    /// `grad L . grad f > 0` within `radius` of the middle of a box, by
-    /// `grad L . grad f(m) + (grad L . H) . (x - m)`.
-    pub(crate) fn is_transversal_along(&self, bend: &IntervalBend, radius: &Vec3) -> bool {
-        let (mut least, mut size) = (0.0, 0.0);
-        for (g, slope) in self.gradient.iter().zip(&bend.middle.gradient) {
-            least += (g * slope.lo).min(g * slope.hi);
-            size += g.abs() * slope.lo.abs().max(slope.hi.abs());
-        }
-        let spreads = self.spreads(bend, radius);
-        let spread = spreads.x + spreads.y + spreads.z;
-        // Unbounded slopes make the spread infinite or NaN; what cancels within it has the size
-        // of the terms, which the spread of the plain sizes bounds.
-        let sizes = HESSIAN_ROWS.map(|row| {
-            let size = |k: usize| bend.hessian[row[k]].lo.abs().max(bend.hessian[row[k]].hi.abs());
-            (0..3).map(|k| self.gradient[k].abs() * size(k)).sum::<f64>()
-        });
-        size += (0..3).map(|k| sizes[k] * radius[k]).sum::<f64>();
-        least - spread > ROUNDING * size && size.is_finite()
+    /// `grad L . grad f > 0` on the box of a [`Bend`].
+    pub(crate) fn is_transversal_along(&self, bend: &Bend) -> bool {
+        let [middle, half] = &bend.slope;
+        let spreads = self.spreads(bend);
+        let least = self.gradient.dot(middle) - self.gradient.abs().dot(half);
+        let size = self.gradient.abs().dot(&bend.size);
+        // Unbounded slopes make the spread infinite or NaN: nothing is proved.
+        least - (spreads.x + spreads.y + spreads.z) > ROUNDING * size && size.is_finite()
     }
 
-    /// How far `(grad L . H) . d` reaches for `|d| <= radius`, by the components of d.
-    pub(crate) fn spreads(&self, bend: &IntervalBend, radius: &Vec3) -> Vec3 {
-        let of_axis = |k: usize| {
-            let (mut lo, mut hi) = (0.0, 0.0);
-            for (g, &at) in self.gradient.iter().zip(&HESSIAN_ROWS[k]) {
-                let (a, b) = (g * bend.hessian[at].lo, g * bend.hessian[at].hi);
-                lo += a.min(b);
-                hi += a.max(b);
-            }
-            hi.max(-lo) * radius[k]
-        };
-        Vec3::new(of_axis(0), of_axis(1), of_axis(2))
+    /// How far `(grad L . H) . d` reaches on the box, by the components of d.
+    pub(crate) fn spreads(&self, bend: &Bend) -> Vec3 {
+        let sizes = self.gradient.abs();
+        Vec3::from(
+            bend.turns.map(|[middle, half]| self.gradient.dot(&middle).abs() + sizes.dot(&half)),
+        )
     }
 
     /// `f`, enclosed by `value`, and `L` are both positive or both negative on what the box

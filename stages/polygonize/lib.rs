@@ -93,7 +93,7 @@ pub struct Polygonize {
 
 impl Stage for Polygonize {
     const NAME: &'static str = "polygonize";
-    const VERSION: u32 = 5;
+    const VERSION: u32 = 6;
     type Params = PolygonizeParams;
     type Whole<'a> = ();
     type Rows<'a> = ();

@@ -6,6 +6,7 @@ use crate::{Sandbox, config_path, program};
 use isospline::config::ModelFile;
 use isospline::{Model, ModelFolder};
 use isospline_artifact::Durability;
+use isospline_implicit::InstructionSet;
 use isospline_pipeline::RunOptions;
 use std::path::Path;
 use std::process::Command;
@@ -16,6 +17,13 @@ const MODELS: [(&str, &str); 4] = [
     ("deccube", "target.fit=fast"),
     ("double_torus", "target.faces=1800"),
     ("sphere_320", "check.gap=1e-14"),
+];
+
+/// What the evaluators are compiled for.
+const SETS: [(&str, InstructionSet); 3] = [
+    ("SSE2", InstructionSet::Plain),
+    ("AVX2", InstructionSet::Avx2),
+    ("AVX-512", InstructionSet::Avx512),
 ];
 
 pub(super) fn try_all(scale: Scale, tally: &mut Tally) {
@@ -35,19 +43,20 @@ pub(super) fn try_all(scale: Scale, tally: &mut Tally) {
                 made(&sandbox, model, set, threads).and_then(|found| differ(&found, &expected));
             tally.case(format!("{model}, {threads} threads"), same);
         }
-        for plain in [true, false] {
-            let name = if plain { "SSE2" } else { "AVX2" };
-            if !plain && !isospline_implicit::has_avx2() {
-                tally.skip("AVX2", "this processor has none");
+        for (name, instructions) in SETS {
+            if !instructions.is_there() {
+                tally.skip(name, "this processor has none");
                 continue;
             }
-            let same = in_process(&sandbox.path(name), model, set, plain)
+            let same = in_process(&sandbox.path(name), model, set, instructions)
                 .and_then(|found| differ(&found, &expected));
             tally.case(format!("{model}, {name}"), same);
         }
     }
     moved(tally);
-    tally.figure(format!("threads 1, 2, 3, 8; SSE2, AVX2; moved; {bytes} bytes compared each"));
+    tally.figure(format!(
+        "threads 1, 2, 3, 8; SSE2, AVX2, AVX-512; moved; {bytes} bytes compared each"
+    ));
 }
 
 /// Artifacts of a run on so many threads.
@@ -63,8 +72,13 @@ fn made(sandbox: &Sandbox, model: &str, set: &str, threads: &str) -> Result<Arti
 }
 
 /// Artifacts of a run in this process, with the evaluators of one instruction set.
-fn in_process(out: &Path, model: &str, set: &str, plain: bool) -> Result<Artifacts, String> {
-    isospline_implicit::use_plain_code(plain);
+fn in_process(
+    out: &Path,
+    model: &str,
+    set: &str,
+    instructions: InstructionSet,
+) -> Result<Artifacts, String> {
+    isospline_implicit::use_at_most(instructions);
     let ran = || -> Result<(), String> {
         let file = ModelFile::open(config_path(model).as_ref(), &[set.to_owned()]);
         let model = Model::new(file.map_err(|error| error.to_string())?);
@@ -74,7 +88,7 @@ fn in_process(out: &Path, model: &str, set: &str, plain: bool) -> Result<Artifac
         report.map(drop).map_err(|error| error.to_string())
     };
     let ran = ran();
-    isospline_implicit::use_plain_code(false);
+    isospline_implicit::use_at_most(InstructionSet::Avx512);
     ran.map(|()| artifacts(out))
 }
 
