@@ -1,10 +1,15 @@
 //! A triangular face whose edges are cut into different numbers of segments, as triangles.
 //!
-//! Inside is the regular grid of some level without its border; three strips join it to the
-//! edges. Where all edges have as many segments as the level the whole is the regular grid, and
-//! where one edge is whole there may be no inner points at all.
+//! Inside is a regular grid; three strips join it to the edges, of as many steps together as the
+//! level says. Where all edges have as many segments as the level the whole is the regular grid,
+//! and where one edge is whole there may be no inner points at all.
 
 use isospline_geometry::bezier_triangle::{exponents, index, n_control};
+
+/// Height of the strips, in quarters of the height of a row of the grid. Where the points of an edge
+/// and of the grid do not stand by turns, triangles lean: in a full row their circles are 1.3 times
+/// as large, square, as in the grid, which would have to be finer for their sake.
+const STRIP: usize = 3;
 
 /// What a point of a face lies on; steps are counted from the corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +38,8 @@ pub(super) struct Tiling {
 pub(super) struct Shape {
     /// Segments of the edges from each corner to the next.
     pub(super) segments: [usize; 3],
-    /// Steps a side of the grid that holds the inner points; 0 where there are none and one edge
-    /// is whole.
+    /// Three more than the steps a side of the grid of the inner points; 0 where there are none and
+    /// one edge is whole.
     pub(super) level: usize,
 }
 
@@ -63,15 +68,24 @@ impl Shape {
                 at[corner] = (n - step) as f64 / n as f64;
                 at[(corner + 1) % 3] = step as f64 / n as f64;
             }
-            Place::Inner { exponents, .. } => {
+            Place::Inner { exponents, .. } if self.is_grid() => {
                 at = exponents.map(|x| x as f64 / self.level as f64);
+            }
+            Place::Inner { exponents, .. } => {
+                let span = span(self.level) as f64;
+                at = exponents.map(|x| (4 * (x - 1) + STRIP) as f64 / span);
             }
         }
         at
     }
 
+    /// Whether the whole is the regular grid.
+    fn is_grid(&self) -> bool {
+        self.segments == [self.level; 3]
+    }
+
     pub(super) fn tiling(self) -> Tiling {
-        if self.segments == [self.level; 3] {
+        if self.is_grid() {
             let places = self.grid_places().collect();
             let triangles = grid_triangles(self.level).map(|t| t.map(|q| q as u32)).collect();
             return Tiling { places, triangles };
@@ -160,9 +174,9 @@ impl Tiling {
             let start = usize::from(is_cut[corner]);
             let outer = &outer[start..=n - usize::from(is_cut[(corner + 1) % 3])];
             let inner: Vec<u32> = (0..=side).map(|step| inner(corner, step)).collect();
-            // Along the edge, an inner point of step t stands at (t + 3/2) / level.
+            // Along the edge, an inner point of step t stands at (4 t + 3/2 STRIP) / span.
             self.zip([outer, &inner], |s, t| {
-                is_before((2 * (s + start) + 1, 2 * n), (t + 2, level))
+                is_before((2 * (s + start) + 1, 2 * n), (8 * t + 4 + 3 * STRIP, 2 * span(level)))
             });
         }
     }
@@ -171,9 +185,9 @@ impl Tiling {
     /// an edge from the corner inward would be the longest of all.
     fn cut(&mut self, corner: usize, rows: &[Vec<u32>; 3], inner: u32, level: usize) -> bool {
         let (after, before) = (&rows[corner], &rows[(corner + 2) % 3]);
-        // The cut passes the innermost point where the two numbers of segments make the level;
-        // there should be room for a triangle between them.
-        let is_clear = 2 * (after.len() + before.len() - 2) >= 3 * level;
+        // The cut meets the innermost point where the two numbers of segments, as many strips, make
+        // the span; there should be room for a triangle between them.
+        let is_clear = 3 * STRIP * (after.len() + before.len() - 2) >= 4 * span(level);
         if after.len() == 2 || before.len() == 2 || !is_clear {
             return false;
         }
@@ -197,6 +211,11 @@ impl Tiling {
             }
         }
     }
+}
+
+/// The denominator of the inner points: the rows of the grid and three strips, in quarters of a row.
+fn span(level: usize) -> usize {
+    4 * (level - 3) + 3 * STRIP
 }
 
 /// Whether one fraction is not above another.
