@@ -15,12 +15,6 @@ const SEARCHES: usize = 16;
 /// Failing tetrahedra, of those that the surface passes, from which on it may be singular
 /// everywhere.
 const ALL: f64 = 0.95;
-/// Tetrahedra tested in refinement rounds, for each that the grid had and at least
-/// [`LEAST_BUDGET`], before the proof is given up: along a kink their number doubles with every
-/// halving and nothing is gained.
-const BUDGET: usize = 1;
-const LEAST_BUDGET: usize = 10_000;
-
 /// Refines `complex` until all its tetrahedra pass the test; returns those that will not: all
 /// surface that the mesh may lack lies in them.
 ///
@@ -36,7 +30,7 @@ pub(crate) fn prove(
     let mut failed = failing_cells(ctx, complex);
     search_singular_points(ctx, complex, &failed, are_all(complex, &failed))?;
     let smallest = complex.grid.scale() >> params.max_depth;
-    let mut budget = LEAST_BUDGET.max(BUDGET * 6 * complex.n_cells());
+    let mut budget = budget(complex);
     let mut rounds = 0;
     while !failed.is_empty() {
         ctx.host.progress(rounds, 3 * u64::from(params.max_depth))?;
@@ -54,6 +48,20 @@ pub(crate) fn prove(
     }
     counters.count("refinement_rounds", rounds);
     Ok(failed)
+}
+
+/// Tetrahedra tested in refinement rounds before the proof is given up: along a kink their number
+/// doubles with every halving and nothing is gained.
+fn budget(complex: &Complex) -> usize {
+    /// As many as the grid had, in a small grid.
+    const SMALL: usize = 60_000;
+    /// The least.
+    const LEAST: usize = 10_000;
+    /// A share of those that a large grid had. A regular surface fails in a few there; a sheet
+    /// thinner than the grid fails everywhere, and a round takes a minute.
+    const SHARE: usize = 8;
+    let n_tetrahedra = 6 * complex.n_cells();
+    LEAST.max(n_tetrahedra.min(SMALL)).max(n_tetrahedra / SHARE)
 }
 
 /// Searches singular points where the unrefined complex fails the test.
