@@ -1,6 +1,6 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench bench-peers library-bench cluster reliability golden pictures docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench bench-peers library-bench cluster reliability fuzz-check golden pictures docs clean
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
@@ -43,7 +43,7 @@ unit:
 readers: build ## read the exports with OCCT, gmsh, vtk, trimesh, manifold3d, lib3mf and others
 	bash tests/readers/run.sh
 
-bench: ## every bench, then each stage's time, share and ns a patch at 5k and 50k faces
+bench: ## every bench, then each stage's time and ns a patch at 5k, 50k and 500k faces, and what overlaps
 	$(CARGO) bench --workspace
 	$(CARGO) run --release -q -p isospline --example stage_times
 	$(CARGO) run --release -q -p isospline --example overlap
@@ -66,6 +66,9 @@ bench-peers: build ## the decorative cube to 1e-3 .. 1e-8, beside marching cubes
 
 reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
 	$(CARGO) run --release -q -p isospline-tests --bin scoreboard
+
+fuzz-check: ## check that the targets of cargo-fuzz compile (needs a C++ compiler)
+	$(CARGO) check --manifest-path fuzz/Cargo.toml --target-dir $(TARGET)/fuzz
 
 golden: ## rewrite tests/golden; read the diff
 	ISOSPLINE_GOLDEN=rewrite $(CARGO) test -p isospline-tests --test golden
