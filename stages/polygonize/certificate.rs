@@ -129,7 +129,7 @@ fn look(field: &dyn Field, tests: &mut [Test<'_>], mut batch: Vec<Entry>) {
 /// Boxes over which no second derivatives are known: whole cubes, or all if the field has none.
 fn look_at_new(field: &dyn Field, tests: &mut [Test<'_>], batch: Vec<Entry>) {
     let mut open = with_jets(field, tests, batch, |part| part.domain);
-    keep_unproved(tests, &mut open, |part, test, jet| part.look(test, jet));
+    keep_unproved(tests, &mut open, Part::look);
     let mut bent: Vec<Entry> = open.iter().map(|(entry, _)| *entry).collect();
     if renew(field, bent.iter_mut().map(|(_, part)| part).collect()) {
         return look_along_slopes(field, tests, bent);
