@@ -14,13 +14,13 @@ from surface import bernstein, check, slopes, surfaces
 
 BACKGROUND = (255, 0, 255)
 # Levels of 255. Rounding to whole levels leaves 0.3 of some 0.5; facets at the default tolerance
-# leave 1.4.
+# leave 1.7.
 MOST_UNEVEN = 0.8
 # No point that is seen is darker; the ambient light alone gives 60.
 BLACK = 30
 # Where the surface faces the sun it is brighter.
 LIT = 160
-# Of the pixels of the outline; its border is two pixels wide at most.
+# Part of the pixels seen that may be astray; a border three pixels wide is not judged.
 MOST_ASTRAY = 0.002
 # The samples of export/sample.rs: their patches meet at an angle, which is to be seen.
 CREASED = {"sample", "hollow"}

@@ -6,9 +6,9 @@
 
 use isospline_geometry::bezier_triangle::{exponents, index, n_control};
 
-/// Height of the strips, in quarters of the height of a row of the grid. Where the points of an edge
-/// and of the grid do not stand by turns, triangles lean: in a full row their circles are 1.3 times
-/// as large, square, as in the grid, which would have to be finer for their sake.
+/// Height of the strips, in quarters of a row of the grid. Where the points of an edge and of the
+/// grid do not stand by turns triangles lean, which in a full row makes the squares of their circles
+/// 1.3 times as large as in the grid: it would have to be finer for their sake.
 const STRIP: usize = 3;
 
 /// What a point of a face lies on; steps are counted from the corner.
@@ -213,7 +213,7 @@ impl Tiling {
     }
 }
 
-/// The denominator of the inner points: the rows of the grid and three strips, in quarters of a row.
+/// The denominator of the inner points: rows of the grid and three strips, in quarters of a row.
 fn span(level: usize) -> usize {
     4 * (level - 3) + 3 * STRIP
 }
