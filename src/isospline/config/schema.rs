@@ -126,12 +126,7 @@ fn key_schema(table: &str, key: &str) -> Value {
             forms.push(json!({ "type": "string", "enum": words }));
         }
     }
-    let side = || toml::Value::Array(vec![0.into(), 1.into()]);
-    if fits(table, key, vec![side(), side(), side()]) {
-        let pair =
-            json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 });
-        forms.push(json!({ "type": "array", "items": pair, "minItems": 3, "maxItems": 3 }));
-    }
+    forms.extend(list_forms(table, key));
     let free = toml::Table::from_iter([("a".to_owned(), toml::Value::Float(1.5))]);
     if fits(table, key, free) {
         forms.push(json!({ "type": "object", "additionalProperties": { "type": "number" } }));
@@ -140,6 +135,28 @@ fn key_schema(table: &str, key: &str) -> Value {
         1 => forms.remove(0),
         _ => json!({ "anyOf": forms }),
     }
+}
+
+/// The lists that a key takes: three sides of a box, or lists of points.
+fn list_forms(table: &str, key: &str) -> Vec<Value> {
+    let list = |items: Value| json!({ "type": "array", "items": items });
+    let fixed = |items: Value, n: usize| {
+        let mut fixed = list(items);
+        fixed["minItems"] = n.into();
+        fixed["maxItems"] = n.into();
+        fixed
+    };
+    let point = toml::Value::Array(vec![0.5.into(); 3]);
+    let number = json!({ "type": "number" });
+    let mut forms = Vec::new();
+    let sides = [0, 1, 2].map(|k| toml::Value::Array(vec![k.into(), (k + 1).into()]));
+    if fits(table, key, sides.to_vec()) {
+        forms.push(fixed(fixed(number.clone(), 2), 3));
+    }
+    if fits(table, key, vec![toml::Value::Array(vec![point])]) {
+        forms.push(list(list(fixed(number, 3))));
+    }
+    forms
 }
 
 /// The words that a key takes: those in quotes in what the reader says to another one, if it takes
