@@ -28,15 +28,16 @@ fn limited(sandbox: &Sandbox, limit: &str, args: &[&str]) -> Output {
     let program = sandbox.command(&[]).get_program().to_owned();
     let mut shell = Command::new("sh");
     shell.current_dir(sandbox.path("")).arg("-c").arg(format!("ulimit {limit}; exec \"$@\""));
-    shell.arg("sh").arg(program).args(args).output().unwrap()
+    shell.arg("sh").arg(program).args(args).output().expect("sh starts")
 }
 
 /// The draft of the file that is being written, once there are some bytes in it.
 fn draft_with_bytes(sandbox: &Sandbox) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(sandbox.path("files")).unwrap();
-    let mut drafts = entries.map(|entry| entry.unwrap().path());
+    let entries = std::fs::read_dir(sandbox.path("files")).expect("the folder can be read");
+    let mut drafts = entries.map(|entry| entry.expect("an entry").path());
     drafts.find(|path| {
-        let is_draft = path.file_name().unwrap().to_string_lossy().starts_with(".isospline-");
+        let is_draft =
+            path.file_name().expect("a name").to_string_lossy().starts_with(".isospline-");
         is_draft && std::fs::metadata(path).is_ok_and(|data| data.len() > 0)
     })
 }
@@ -50,9 +51,9 @@ fn memory_does_not_grow_with_the_file(sandbox: &Sandbox) {
         }
         let output = limited(sandbox, &format!("-d {MEMORY_KB}"), &args);
         assert!(output.status.success(), "{format}: {}", String::from_utf8_lossy(&output.stderr));
-        let length = std::fs::metadata(sandbox.path(&file)).unwrap().len();
+        let length = std::fs::metadata(sandbox.path(&file)).expect("the file is there").len();
         assert!(length > 1024 * MEMORY_KB, "{format}: {length} bytes prove nothing");
-        std::fs::remove_file(sandbox.path(&file)).unwrap();
+        std::fs::remove_file(sandbox.path(&file)).expect("the file goes");
     }
 }
 
@@ -62,21 +63,35 @@ fn a_killed_export_leaves_the_file_that_was_there(sandbox: &Sandbox) {
         let before = b"what was there before";
         sandbox.write(&file, before);
         let args = ["export", "out", "--format", format, "-o", &file];
-        let mut child = sandbox.command(&args).stdout(Stdio::null()).spawn().unwrap();
+        let mut child =
+            sandbox.command(&args).stdout(Stdio::null()).spawn().expect("the program starts");
         let draft = loop {
             if let Some(draft) = draft_with_bytes(sandbox) {
                 break draft;
             }
-            assert!(child.try_wait().unwrap().is_none(), "{format}: done before it was killed");
+            assert!(
+                child.try_wait().expect("a child").is_none(),
+                "{format}: done before it was killed"
+            );
         };
-        child.kill().unwrap();
-        assert_eq!(child.wait().unwrap().code(), None, "{format}: done before it was killed");
-        assert!(std::fs::read(sandbox.path(&file)).unwrap() == before, "{format}");
-        std::fs::remove_file(draft).unwrap();
+        child.kill().expect("a child");
+        assert_eq!(
+            child.wait().expect("a child").code(),
+            None,
+            "{format}: done before it was killed"
+        );
+        assert!(
+            std::fs::read(sandbox.path(&file)).expect("the file is there") == before,
+            "{format}"
+        );
+        std::fs::remove_file(draft).expect("the file goes");
         // And what is written next is whole.
         sandbox.succeeds(&args);
-        assert!(std::fs::metadata(sandbox.path(&file)).unwrap().len() > 100_000, "{format}");
-        std::fs::remove_file(sandbox.path(&file)).unwrap();
+        assert!(
+            std::fs::metadata(sandbox.path(&file)).expect("the file is there").len() > 100_000,
+            "{format}"
+        );
+        std::fs::remove_file(sandbox.path(&file)).expect("the file goes");
     }
 }
 
@@ -86,10 +101,13 @@ fn a_file_that_does_not_fit_leaves_the_one_that_was_there_and_no_draft(sandbox: 
     let args = ["export", "out", "--format", "step", "-o", "files/surface.step"];
     let output = limited(sandbox, "-f 2000", &args);
     assert_eq!(output.status.code(), Some(33), "{}", String::from_utf8_lossy(&output.stderr));
-    let entries = std::fs::read_dir(sandbox.path("files")).unwrap();
-    let names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+    let entries = std::fs::read_dir(sandbox.path("files")).expect("the folder can be read");
+    let names: Vec<_> = entries.map(|entry| entry.expect("an entry").file_name()).collect();
     assert_eq!(names, ["surface.step"]);
-    assert_eq!(std::fs::read(sandbox.path("files/surface.step")).unwrap(), b"before");
+    assert_eq!(
+        std::fs::read(sandbox.path("files/surface.step")).expect("the file is there"),
+        b"before"
+    );
 }
 
 #[test]
@@ -110,7 +128,7 @@ fn equal_surfaces_give_equal_files_whatever_the_threads() {
                 "--tolerance",
                 "1e-3",
             ]);
-            let bytes = std::fs::read(sandbox.path("surface")).unwrap();
+            let bytes = std::fs::read(sandbox.path("surface")).expect("the file is there");
             match kept.get(k) {
                 Some(first) => assert!(*first == bytes, "{format}"),
                 None => kept.push(bytes),
