@@ -45,6 +45,18 @@ fn a_closure_that_is_positive_inside_is_turned() {
 }
 
 #[test]
+fn a_tolerance_is_met_by_as_few_faces_as_the_library_finds() {
+    let field = ClosureField::new(2.0, value)
+        .with_gradient(|p: Vec3| Vec3::new(p.x / 2.0, 2.0 * p.y, 2.0 * p.z))
+        .with_hessian(|_| [0.5, 0.0, 0.0, 2.0, 0.0, 2.0]);
+    let options = Options { tolerance: Some(1e-6), ..Options::new(domain()) };
+    let report = convert(&field, &options).unwrap().check(&CheckParams::default()).unwrap();
+    assert!(report.pass, "{:?}", report.failures);
+    let error = report.rel_error_max;
+    assert!((1e-6 / 3.0..=1e-6).contains(&error), "{error:e} with {} faces", report.faces);
+}
+
+#[test]
 fn a_surface_that_leaves_the_box_is_an_error() {
     let small = Aabb::new(Vec3::repeat(-1.1), Vec3::repeat(1.1));
     let refused = convert(&ClosureField::new(2.0, value), &Options::new(small)).unwrap_err();

@@ -70,6 +70,19 @@ pub(crate) fn measure(surface: &Surface<'_>, field: &dyn Field, for_each: ForEac
     out
 }
 
+/// The faces whose patch faces inward at a sample, or is farther from the surface than `limit`,
+/// in model units.
+pub fn unfit_faces(
+    surface: &Surface<'_>,
+    field: &dyn Field,
+    limit: f64,
+    for_each: ForEach<'_>,
+) -> Vec<u32> {
+    let faces = measure(surface, field, for_each).faces;
+    let is_unfit = |figures: &FaceFigures| figures.flipped || figures.max > limit;
+    (0..).zip(faces).filter(|(_, figures)| is_unfit(figures)).map(|(face, _)| face).collect()
+}
+
 /// The place of `stencil` on face `f`.
 pub(crate) fn place(surface: &Surface<'_>, f: usize, stencil: &Stencil, value: f64) -> Place {
     let point = PreparedPatch::new(&surface.net(f)).evaluate(stencil).point.into();

@@ -18,4 +18,4 @@ pub use foreign::foreign_as_toml;
 pub use model_file::{Domain, Inside, ModelFile, ModelTable};
 pub use schema::schema;
 pub use stage_params::StageParams;
-pub use target::{DEFAULT_FACES, TargetTable};
+pub use target::{DEFAULT_FACES, DEFAULT_MENDS, TargetTable};

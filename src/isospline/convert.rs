@@ -1,7 +1,9 @@
 //! A caller's own field becomes a surface in memory.
 
+use crate::config::DEFAULT_MENDS;
 use crate::config::{ConfigError, Inside, StageParams};
 use crate::folder::{CURVES_COUNTER, refused, relax_goal, up_to_curves};
+use crate::mending::{Mending, Place, applies, unfit_places};
 use crate::model::{given_mesh, oriented};
 use crate::stages;
 use crate::tolerance::{Found, Round, Step, next};
@@ -36,6 +38,9 @@ pub struct Options<'a> {
     /// Largest error, relative to the diagonal of the box around the vertices, above 0 and below
     /// 1: the faces follow from it, unless a base mesh is given. Default: none.
     pub tolerance: Option<f64>,
+    /// Surfaces made at most after one with patches that fold or lie beyond the
+    /// tolerance, with those faces split.
+    pub mends: u32,
     /// The value of the field on the surface.
     pub level: f64,
     /// The side that is solid.
@@ -55,6 +60,7 @@ impl Options<'_> {
             domain,
             faces: crate::config::DEFAULT_FACES,
             tolerance: None,
+            mends: DEFAULT_MENDS,
             level: 0.0,
             inside: Inside::Auto,
             base_mesh: None,
@@ -141,7 +147,7 @@ pub fn convert_with_events<'f>(
     let job = ConvertJob { field: &field, options, on_event, registry: stages::registry() };
     match options.tolerance {
         Some(tolerance) if options.base_mesh.is_none() => job.within(tolerance),
-        _ => job.whole(&options.stages.with_faces(options.faces)),
+        _ => job.mended(&options.stages.with_faces(options.faces), options.faces),
     }
 }
 
@@ -164,12 +170,14 @@ impl<'f> ConvertJob<'_, 'f> {
                 Step::Surface(faces) => (faces, true),
                 Step::End(ending) => match latest.filter(|(faces, _)| *faces == ending.faces) {
                     Some((_, conversion)) => return Ok(conversion),
-                    None => return self.whole(&self.params(ending.faces, tolerance)),
+                    None => {
+                        return self.mended(&self.params(ending.faces, tolerance), ending.faces);
+                    }
                 },
             };
             let params = self.params(faces, tolerance);
             let made = if is_whole {
-                self.whole(&params).map(Some)
+                self.mended(&params, faces).map(Some)
             } else {
                 let made = self.run(&params, false);
                 made.map(|(run, ..)| curves_of(&run, tolerance)).map(|curves| {
@@ -197,6 +205,28 @@ impl<'f> ConvertJob<'_, 'f> {
         let mut params = self.options.stages.with_faces(faces);
         params.relax.goal = params.relax.goal.max(relax_goal(tolerance));
         params
+    }
+
+    /// The surface, made again and again while patches are unfit; the one with the
+    /// fewest of them.
+    fn mended(&self, params: &StageParams, faces: u32) -> Result<Conversion<'f>, ConvertError> {
+        let mut best = self.whole(params)?;
+        if !applies(params, self.options.base_mesh.is_some()) {
+            return Ok(best);
+        }
+        let mut mending = Mending::default();
+        mending.add(best.unfit_places(self.options.run.threads)?);
+        while !mending.is_over(self.options.mends, faces) {
+            let mut params = params.clone();
+            params.adapt.splits.extend_from_slice(mending.tried());
+            let n_before = mending.tried().len();
+            let made = self.whole(&params)?;
+            mending.add(made.unfit_places(self.options.run.threads)?);
+            if mending.kept().len() == n_before {
+                best = made;
+            }
+        }
+        Ok(best)
     }
 
     fn whole(&self, params: &StageParams) -> Result<Conversion<'f>, ConvertError> {
@@ -268,6 +298,11 @@ impl Conversion<'_> {
         };
         let threads = Threads::new(RunOptions::default().threads);
         Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
+    }
+
+    fn unfit_places(&self, threads: usize) -> Result<Vec<Place>, ConvertError> {
+        let surface = Surface::from_patches(&self.patches()?)?;
+        Ok(unfit_places(&surface, &self.field, self.expected.tolerance, threads))
     }
 
     fn found(&self, tolerance: f64) -> Result<Found, ConvertError> {

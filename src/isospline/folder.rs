@@ -1,7 +1,9 @@
 //! A model folder: artifacts, the canonical model file, the last report.
 
+mod mends;
 mod rounds;
 
+pub use mends::MENDS_NOTE;
 pub(crate) use rounds::{CURVES_COUNTER, refused, relax_goal, up_to_curves};
 pub use rounds::{ROUNDS_NOTE, Rounds};
 
@@ -62,10 +64,10 @@ impl ModelFolder {
         let graph = stages::graph(&registry, &model.file.stages, model.base_mesh.as_ref());
         let (key, store) = (model.key(), FolderStore::new(path, durability));
         let mut folder = Self { model, key, store, registry, graph };
-        if folder.has_rounds()
-            && let Ok(faces) = folder.noted_faces()
+        if let Ok(faces) = folder.noted_faces()
+            && let Ok(splits) = folder.noted_splits(faces)
         {
-            folder.graph = folder.sized_graph(faces);
+            folder.graph = folder.sized_graph(faces, &splits);
         }
         folder
     }
@@ -94,7 +96,8 @@ impl ModelFolder {
     }
 
     /// Makes what is not fresh, after writing the canonical model file. A model with a tolerance
-    /// is run for several numbers of faces, until its error is just below it.
+    /// is run for several numbers of faces, until its error is just below it; where patches
+    /// fold or lie beyond the tolerance the surface is made again with those faces split.
     ///
     /// # Errors
     /// See [`RunError`]; what was finished is kept.
@@ -104,11 +107,25 @@ impl ModelFolder {
         on_event: &(dyn Fn(&Event) + Sync),
     ) -> Result<RunReport, RunError> {
         self.save_model()?;
-        if self.has_rounds() && options.only.is_none() {
+        if options.only.is_some() {
+            return self.run_graph(&self.graph, options, on_event);
+        }
+        if self.has_rounds() {
             return self.run_rounds(options, on_event);
         }
+        self.run_mended(self.model.file.target.faces(), options, on_event)
+    }
+
+    fn run_graph(
+        &self,
+        graph: &Graph,
+        options: &RunOptions<'_>,
+        on_event: &(dyn Fn(&Event) + Sync),
+    ) -> Result<RunReport, RunError> {
+        let (registry, model) = (&self.registry, &self.key);
+        let pipeline = Pipeline { registry, graph, model, store: &self.store };
         let scene = Scene { field: &self.model.field, domain: self.model.domain };
-        self.pipeline().run(scene, options, on_event)
+        pipeline.run(scene, options, on_event)
     }
 
     /// State of every stage.

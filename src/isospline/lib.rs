@@ -8,6 +8,7 @@ mod box_search;
 pub mod config;
 mod convert;
 mod folder;
+mod mending;
 mod model;
 pub mod report;
 pub mod stages;
@@ -16,7 +17,8 @@ pub mod tolerance;
 pub use box_search::Reach;
 pub use convert::{Conversion, ConvertError, Options, convert, convert_with_events};
 pub use folder::{
-    BASE_MESH_NOTE, FolderError, MODEL_NOTE, ModelFolder, REPORT_NOTE, ROUNDS_NOTE, Rounds,
+    BASE_MESH_NOTE, FolderError, MENDS_NOTE, MODEL_NOTE, ModelFolder, REPORT_NOTE, ROUNDS_NOTE,
+    Rounds,
 };
 pub use isospline_check::{CheckParams, CheckReport};
 pub use isospline_geometry::{Aabb, TriangleMesh, Vec3};

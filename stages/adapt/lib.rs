@@ -14,6 +14,7 @@ mod improve;
 pub mod order;
 mod params;
 mod repair;
+mod splits;
 mod surface_mesh;
 mod vertex;
 
@@ -35,7 +36,7 @@ pub struct Adapt {
 
 impl Stage for Adapt {
     const NAME: &'static str = "adapt";
-    const VERSION: u32 = 6;
+    const VERSION: u32 = 7;
     type Params = AdaptParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();
@@ -99,6 +100,11 @@ impl Adapt {
         counters.max("curve_error_rel", improve::worst_curve_error_rel(&surface, &mut cache));
         if improving && self.params.curves == Curves::Normal {
             self.improve_normal(ctx, &mut surface, n_faces, counters)?;
+        }
+        let mut cache = ErrorCache::default();
+        for middles in &self.params.splits {
+            splits::split_faces(&mut surface, middles, counters);
+            improve::trim(&mut surface, goal, &mut cache, counters);
         }
         counters.count("slivers_left", surface.slivers(self.params.min_quality));
         Ok(surface.mesh.compact())

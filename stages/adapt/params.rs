@@ -45,6 +45,9 @@ pub struct AdaptParams {
     pub curves: Curves,
     /// Rounds of improvement for curves of normal distance, after the others, 0 to 1000.
     pub normal_rounds: u32,
+    /// Middles of faces, model units, that are split across their longest side when all else is
+    /// done, list after list; a middle that no face has is left out.
+    pub splits: Vec<Vec<[f64; 3]>>,
 }
 
 impl Default for AdaptParams {
@@ -58,6 +61,7 @@ impl Default for AdaptParams {
             improve_rounds: 8,
             curves: Curves::Normal,
             normal_rounds: 12,
+            splits: Vec::new(),
         }
     }
 }

@@ -9,6 +9,12 @@ const MAX_TURN: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// worst curve (double torus of 1800 faces, chair of 4000); without a bound sectors close.
 const SHARE: f64 = 0.45;
 
+/// Part of the way to the third corner of a face, beside the chord, by which a tangent may turn
+/// aside over the length of the chord. Long sides of flat faces otherwise reach across them: two
+/// patches of the raw torus of 600 faces then fold beside a corner of 1.6 degrees. With half of it
+/// meshes of deccube fold in more places, since their curves become worse.
+const BESIDE: f64 = 1.0;
+
 /// Range of the tangent of the angle between chord and curve as they leave a vertex, both seen in
 /// its tangent plane; positive counter-clockwise from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,12 +31,15 @@ impl Slant {
     ///
     /// Each sector keeps a tenth of its angle and of what it lacks to 180 degrees, whatever the
     /// neighbours do, so `lambda0` stays in (0, 1). An edge beside a sector out of (0, 180) degrees
-    /// may only turn to mend it.
+    /// may only turn to mend it, and the long side of a flat face turns no further than its third
+    /// corner lies beside it.
     pub fn between(chord: &Vec3, ccw: &Vec3, cw: &Vec3, normal: &Vec3) -> Self {
         let (left, right) = (angle(chord, ccw, normal), angle(cw, chord, normal));
+        let flat = |v: &Vec3| (v - v.dot(normal) * normal).norm();
+        let beside = |v: &Vec3, a: f64| BESIDE * flat(v) * libm::sin(a).max(0.0) / flat(chord);
         let narrow = |a: f64, b: f64| (SHARE * a).min(SHARE * (std::f64::consts::PI - b));
         let turn = |a: f64, b: f64| libm::tan(narrow(a, b).clamp(0.0, MAX_TURN));
-        Self([-turn(right, left), turn(left, right)])
+        Self([-turn(right, left).min(beside(cw, right)), turn(left, right).min(beside(ccw, left))])
     }
 }
 
@@ -65,5 +74,17 @@ mod tests {
         close(range_deg(30.0, -90.0), [-20.0, 13.5]);
         close(range_deg(60.0, -174.0), [-20.0, 2.7]);
         close(range_deg(200.0, -60.0), [0.0, 20.0]);
+    }
+
+    #[test]
+    fn the_long_side_of_a_flat_face_turns_no_further_than_its_corner_lies_beside_it() {
+        // A corner one tenth of the chord beside it, above its middle.
+        let wing = Vec3::new(0.5, 0.1, 0.0);
+        let Slant(range) = Slant::between(&Vec3::x(), &wing, &at(-60.0), &Vec3::z());
+        // 0.45 of the sector of 11.3 degrees is 5.09, a tenth beside 1 is 5.71.
+        assert!((range[1].atan().to_degrees() - 0.45 * 0.2f64.atan().to_degrees()).abs() < 1e-9);
+        let Slant(range) =
+            Slant::between(&Vec3::x(), &(wing - 0.4 * Vec3::x()), &at(-60.0), &Vec3::z());
+        assert!((range[1] - 0.1).abs() < 1e-12, "{range:?}");
     }
 }

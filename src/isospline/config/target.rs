@@ -5,7 +5,7 @@ use crate::config::{ConfigError, Document, Fit};
 use serde::{Deserialize, Serialize};
 
 /// Table `[target]`. Of `faces`, `tolerance` and `tolerance_abs` one is given.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TargetTable {
     /// Faces of the base mesh, at most.
@@ -16,6 +16,21 @@ pub struct TargetTable {
     pub tolerance_abs: Option<f64>,
     /// How the patches are fitted.
     pub fit: Fit,
+    /// Surfaces made at most after one with patches that fold or lie beyond the tolerance, with
+    /// those faces split, 0 to 50.
+    pub mends: u32,
+}
+
+impl Default for TargetTable {
+    fn default() -> Self {
+        Self {
+            faces: None,
+            tolerance: None,
+            tolerance_abs: None,
+            fit: Fit::default(),
+            mends: DEFAULT_MENDS,
+        }
+    }
 }
 
 /// Faces where none are asked for: enough for a genus of about five, done in a blink.
@@ -23,6 +38,13 @@ pub const DEFAULT_FACES: u32 = 2000;
 
 /// A tenth of what values of fields are rounded to, times the diagonal, where formulas are kind.
 const LEAST_TOLERANCE: f64 = 1e-12;
+
+/// Surfaces made at most after one with unfit patches: deccube of 2400 faces takes two, the cube
+/// of the tutorial of SURFER four, and where six do not help more seldom do.
+pub const DEFAULT_MENDS: u32 = 6;
+
+/// Largest `target.mends`.
+const MOST_MENDS: u32 = 50;
 
 /// Keys of which one is given.
 const EXCLUSIVE: [&str; 3] = ["faces", "tolerance", "tolerance_abs"];
@@ -65,6 +87,9 @@ impl TargetTable {
                 "target.faces",
                 "at least 4, the faces of a tetrahedron",
             ));
+        }
+        if self.mends > MOST_MENDS {
+            return Err(out_of_range(doc, "target.mends", "0 to 50"));
         }
         if self.tolerance.is_some_and(|t| !(LEAST_TOLERANCE..1.0).contains(&t)) {
             let message = "from 1e-12, where rounding begins, to below 1, of the box diagonal";

@@ -6,12 +6,14 @@
 //! where it stopped, and one that ended knows the faces and finds its artifacts fresh.
 
 use super::{FolderError, ModelFolder};
+use crate::config::ModelFile;
+use crate::mending::Place;
 use crate::stages;
 use crate::tolerance::{Found, MOST_REFUSALS, Round, Step, Verdict, next};
 use isospline_artifact::StoreError;
 use isospline_artifact::kinds::BaseMesh;
 use isospline_check::{CheckParams, CheckReport};
-use isospline_pipeline::{Event, Graph, Pipeline, RunError, RunOptions, RunReport, Scene};
+use isospline_pipeline::{Event, Graph, RunError, RunOptions, RunReport};
 use isospline_stage::Diagnosis;
 use serde::{Deserialize, Serialize};
 
@@ -78,8 +80,11 @@ impl ModelFolder {
         self.model.file.target.is_by_tolerance() && self.model.base_mesh.is_none()
     }
 
-    /// The faces of the round that is next, or of the surface that is kept.
+    /// The faces asked for: of the round that is next, or of the surface that is kept.
     pub(super) fn noted_faces(&self) -> Result<u32, StoreError> {
+        if !self.has_rounds() {
+            return Ok(self.model.file.target.faces());
+        }
         Ok(match next(&self.noted_rounds()?) {
             Step::Curves(faces) | Step::Surface(faces) => faces,
             Step::End(ending) => ending.faces,
@@ -123,7 +128,7 @@ impl ModelFolder {
         }
     }
 
-    /// Runs the graph for so many faces, or its part up to the curves.
+    /// Makes the surface of so many faces, or its part up to the curves.
     fn run_sized(
         &self,
         faces: u32,
@@ -131,20 +136,19 @@ impl ModelFolder {
         options: &RunOptions<'_>,
         on_event: &(dyn Fn(&Event) + Sync),
     ) -> Result<RunReport, RunError> {
-        let mut graph = self.sized_graph(faces);
-        if !is_whole {
-            up_to_curves(&mut graph);
+        if is_whole {
+            return self.run_mended(faces, options, on_event);
         }
-        let (registry, model) = (&self.registry, &self.key);
-        let pipeline = Pipeline { registry, graph: &graph, model, store: &self.store };
-        let scene = Scene { field: &self.model.field, domain: self.model.domain };
-        pipeline.run(scene, options, on_event)
+        let mut graph = self.sized_graph(faces, &[]);
+        up_to_curves(&mut graph);
+        self.run_graph(&graph, options, on_event)
     }
 
-    /// The graph for so many faces.
-    pub(super) fn sized_graph(&self, faces: u32) -> Graph {
+    /// The graph for so many faces of which some are split.
+    pub(super) fn sized_graph(&self, faces: u32, splits: &[Vec<Place>]) -> Graph {
         let file = &self.model.file;
         let mut params = file.stages.with_faces(faces);
+        params.adapt.splits.extend_from_slice(splits);
         // The default, which the user may have written.
         if params.relax.goal <= 0.0 {
             // The box is a little larger than the surface, which does not matter here.
@@ -172,7 +176,10 @@ impl ModelFolder {
                 Ok(Found::Surface { curves: curves / tolerance, surface, sound: pass })
             }
             Err(FolderError::Store(error)) => Err(error.into()),
-            Err(_) => Ok(Found::Surface { curves, surface: None, sound: false }),
+            Err(_) => {
+                let curves = curves / self.tolerance(self.base_diagonal()?);
+                Ok(Found::Surface { curves, surface: None, sound: false })
+            }
         }
     }
 
@@ -200,15 +207,19 @@ impl ModelFolder {
         self.write_note(ROUNDS_NOTE, &bytes)
     }
 
-    /// All that the rounds depend on: model, parameters but faces, versions of the stages, limits.
+    /// All that the rounds depend on: the surfaces, how folds are mended, the limits.
     fn rounds_key(&self) -> String {
-        let file = &self.model.file;
-        let graph = self.sized_graph(crate::tolerance::FIRST_FACES);
+        let ModelFile { target, check, .. } = &self.model.file;
+        let tolerance = (target.tolerance, target.tolerance_abs);
+        serde_json::json!([self.surfaces_key(), target.mends, tolerance, check]).to_string()
+    }
+
+    /// All that surfaces depend on but their faces: model, parameters, versions of the stages.
+    pub(super) fn surfaces_key(&self) -> String {
+        let graph = self.sized_graph(crate::tolerance::FIRST_FACES, &[]);
         let params: Vec<_> = graph.nodes.iter().map(|node| (&node.stage, &node.params)).collect();
         let versions: Vec<_> = self.registry.stages().map(|s| (s.name, s.version)).collect();
-        let target = (file.target.tolerance, file.target.tolerance_abs);
-        let key = serde_json::json!([self.key.content, params, versions, target, file.check]);
-        key.to_string()
+        serde_json::json!([self.key.content, params, versions]).to_string()
     }
 }
 

@@ -1,0 +1,104 @@
+//! Surfaces with unfit patches, made again with their faces split.
+//!
+//! What was unfit is kept beside the artifacts after each surface: a run that was stopped goes on
+//! where it stopped, and one that ended finds its artifacts fresh.
+
+use super::ModelFolder;
+use crate::mending::{Mending, Place, applies, unfit_places};
+use isospline_artifact::StoreError;
+use isospline_artifact::kinds::Patches;
+use isospline_check::Surface;
+use isospline_pipeline::{Event, RunError, RunOptions, RunReport};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Name of the note of the unfit faces.
+pub const MENDS_NOTE: &str = "mends.json";
+
+/// What is kept of all numbers of faces.
+#[derive(Debug, Serialize, Deserialize)]
+struct Note {
+    /// What the surfaces depend on; under another the note is worth nothing.
+    of: String,
+    by_faces: BTreeMap<u32, Mending>,
+}
+
+impl ModelFolder {
+    /// What is split of the base mesh of so many faces, surface after surface.
+    pub(super) fn noted_splits(&self, faces: u32) -> Result<Vec<Vec<Place>>, StoreError> {
+        let mending = self.noted_mending(faces)?;
+        let is_over = mending.is_over(self.model.file.target.mends, faces);
+        Ok(if is_over { mending.kept() } else { mending.tried() }.to_vec())
+    }
+
+    /// Runs the whole graph for so many faces, again and again while patches are unfit; the
+    /// artifacts are those of the surface with the fewest of them.
+    pub(super) fn run_mended(
+        &self,
+        faces: u32,
+        options: &RunOptions<'_>,
+        on_event: &(dyn Fn(&Event) + Sync),
+    ) -> Result<RunReport, RunError> {
+        if !self.has_mends() {
+            return self.run_graph(&self.sized_graph(faces, &[]), options, on_event);
+        }
+        let mut mending = self.noted_mending(faces)?;
+        let mut seconds = 0.0;
+        let mut latest: Option<(usize, RunReport)> = None;
+        let mut options = *options;
+        while !mending.is_over(self.model.file.target.mends, faces) {
+            let graph = self.sized_graph(faces, mending.tried());
+            let report = self.run_graph(&graph, &options, on_event)?;
+            // What was asked to be made again is made once.
+            options.from = None;
+            seconds += report.seconds;
+            latest = Some((mending.tried().len(), report));
+            mending.add(self.unfit_places(options.threads)?);
+            self.note_mending(faces, &mending)?;
+        }
+        let latest = latest.filter(|(n_split, _)| *n_split == mending.kept().len());
+        let Some((_, report)) = latest else {
+            let graph = self.sized_graph(faces, mending.kept());
+            let report = self.run_graph(&graph, &options, on_event)?;
+            return Ok(RunReport { seconds: report.seconds + seconds, ..report });
+        };
+        Ok(RunReport { seconds, ..report })
+    }
+
+    fn has_mends(&self) -> bool {
+        let file = &self.model.file;
+        file.target.mends > 0 && applies(&file.stages, self.model.base_mesh.is_some())
+    }
+
+    fn unfit_places(&self, threads: usize) -> Result<Vec<Place>, RunError> {
+        let container = self.patches()?;
+        let patches = container.view::<Patches>()?;
+        // Of patches that do not fit together the check tells what is wrong.
+        Ok(Surface::from_patches(&patches).map_or_else(
+            |_| Vec::new(),
+            |surface| {
+                let tolerance = self.model.file.target.tolerance(surface.diagonal());
+                unfit_places(&surface, &self.model.field, tolerance, threads)
+            },
+        ))
+    }
+
+    fn noted_mending(&self, faces: u32) -> Result<Mending, StoreError> {
+        Ok(self.mends()?.remove(&faces).unwrap_or_default())
+    }
+
+    fn mends(&self) -> Result<BTreeMap<u32, Mending>, StoreError> {
+        let bytes = self.note(MENDS_NOTE)?;
+        let note = bytes.and_then(|bytes| serde_json::from_slice::<Note>(&bytes).ok());
+        let note = note.filter(|note| note.of == self.surfaces_key());
+        Ok(note.map_or_else(BTreeMap::new, |note| note.by_faces))
+    }
+
+    fn note_mending(&self, faces: u32, mending: &Mending) -> Result<(), StoreError> {
+        let mut by_faces = self.mends()?;
+        by_faces.insert(faces, mending.clone());
+        let note = Note { of: self.surfaces_key(), by_faces };
+        let bytes = serde_json::to_vec(&note).expect("invariant: a note is plain data");
+        self.write_note(MENDS_NOTE, &bytes)
+    }
+}

@@ -1,0 +1,74 @@
+//! Folded patches: their faces are split and the surface made again, by the program and the library.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use isospline::{Aabb, CheckParams, ClosureField, MENDS_NOTE, Options, Vec3, convert};
+use isospline_tests::{Sandbox, config_path};
+
+/// So few faces that patches fold where the two tori meet.
+const FACES: u32 = 400;
+
+/// Runs the double torus with so few faces; the exit code.
+fn run(sandbox: &Sandbox, more: &[&str]) -> i32 {
+    let (model, faces) = (config_path("double_torus"), format!("target.faces={FACES}"));
+    let args = ["run", &model, "--out", "out", "--no-sync", "--set", &faces];
+    sandbox.isospline(&[&args, more].concat()).code
+}
+
+/// How many faces folded in each surface that was made.
+fn folds(sandbox: &Sandbox) -> Vec<usize> {
+    let note = std::fs::read(sandbox.path("out").join(MENDS_NOTE)).unwrap();
+    let note: serde_json::Value = serde_json::from_slice(&note).unwrap();
+    let made = note["by_faces"][FACES.to_string()].as_array().unwrap().clone();
+    made.iter().map(|folded| folded.as_array().unwrap().len()).collect()
+}
+
+#[test]
+fn faces_that_fold_are_split_until_none_does() {
+    let sandbox = Sandbox::new();
+    assert_eq!(run(&sandbox, &["--set", "target.mends=0"]), 1);
+    let folded = sandbox.checked()["flipped_patches"].as_u64().unwrap();
+    assert!(folded > 0);
+    assert_eq!(run(&sandbox, &[]), 0);
+    let folds = folds(&sandbox);
+    assert_eq!((folds[0] as u64, folds.last()), (folded, Some(&0)));
+    let report = sandbox.checked();
+    assert_eq!((&report["flipped_patches"], &report["pass"]), (&0.into(), &true.into()));
+    // As many vertices are merged elsewhere, where meshes so coarse can spare them.
+    assert!(report["faces"].as_u64().unwrap() <= u64::from(FACES) + 8, "{}", report["faces"]);
+    let split = report["repairs"]["adapt.unfit_faces_split"].as_u64().unwrap();
+    assert!(split >= folded, "{split} faces split");
+}
+
+#[test]
+fn a_mended_surface_is_fresh_and_a_note_cut_short_makes_the_same_again() {
+    let sandbox = Sandbox::new();
+    assert_eq!(run(&sandbox, &[]), 0);
+    let before = sandbox.artifacts();
+    let again = sandbox.succeeds(&["run", "out/model.toml", "--out", "out"]);
+    assert!(again.stdout.contains("nothing to do"), "{}", again.stdout);
+    // As a run killed after its first surface leaves it.
+    let path = sandbox.path("out").join(MENDS_NOTE);
+    let mut note: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    note["by_faces"][FACES.to_string()].as_array_mut().unwrap().truncate(1);
+    sandbox.write(&format!("out/{MENDS_NOTE}"), note.to_string());
+    assert_eq!(run(&sandbox, &[]), 0);
+    assert_eq!(sandbox.artifacts(), before);
+}
+
+#[test]
+fn the_library_mends_folds_as_the_program_does() {
+    let field = ClosureField::new(1.0, |p: Vec3| {
+        let (x2, y2) = (p.x * p.x, p.y * p.y);
+        let ring = x2 * (x2 - 1.0) + y2;
+        ring * ring + p.z * p.z - 0.04
+    });
+    let domain = Aabb::new(Vec3::new(-1.19, -0.74, -0.22), Vec3::new(1.19, 0.74, 0.22));
+    let options = Options { faces: FACES, ..Options::new(domain) };
+    let flips = |mends| {
+        let surface = convert(&field, &Options { mends, ..options.clone() }).unwrap();
+        surface.check(&CheckParams::default()).unwrap().flipped_patches
+    };
+    assert!(flips(0) > 0);
+    assert_eq!(flips(6), 0);
+}
