@@ -217,7 +217,7 @@ fn keep_unproved(
     });
 }
 
-/// `f(m) + grad f(m) . d + d . H d / 2` with H of `bend`, if bounded.
+/// `f(m) + grad f(m) . d + d . H d / 2` for `|d| <= r` by components, if bounded.
 fn taylor_form(middle: &IntervalJet, hessian: &HessianIntervals, r: &Vec3) -> Interval {
     let size = |i: &Interval| i.lo.abs().max(i.hi.abs());
     let sizes = hessian.each_ref().map(size);

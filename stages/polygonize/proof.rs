@@ -15,6 +15,7 @@ const SEARCHES: usize = 16;
 /// Failing tetrahedra, of those that the surface passes, from which on it may be singular
 /// everywhere.
 const ALL: f64 = 0.95;
+
 /// Refines `complex` until all its tetrahedra pass the test; returns those that will not: all
 /// surface that the mesh may lack lies in them.
 ///

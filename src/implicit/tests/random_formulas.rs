@@ -206,17 +206,22 @@ proptest! {
         let mut hessians = [None];
         field.hessian_enclosures(&[domain], &mut hessians);
         let Some([xx, xy, xz, yy, yz, zz]) = hessians[0] else { return Ok(()) };
-        let middle = field.gradient_enclosure(domain.map(|side| Interval::point(side.midpoint())));
-        let middle = middle.unwrap().gradient;
-        let rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-        for share in shares {
-            let point = Vec3::from_fn(|k, _| {
+        let at_share = |share: &[f64; 3]| {
+            Vec3::from_fn(|k, _| {
                 (domain[k].lo + share[k] * domain[k].width()).clamp(domain[k].lo, domain[k].hi)
-            });
+            })
+        };
+        // Any place of the box will do: halves of it use the form about their own middles.
+        let from = at_share(&shares[0]);
+        let there = field.gradient_enclosure([0, 1, 2].map(|k| Interval::point(from[k])));
+        let there = there.unwrap().gradient;
+        let rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        for share in &shares[1..] {
+            let point = at_share(share);
             let jet = field.gradient(point);
             for k in 0..3 {
-                let form = (0..3).fold(middle[k], |sum, j| {
-                    sum + rows[k][j] * Interval::point(point[j] - domain[j].midpoint())
+                let form = (0..3).fold(there[k], |sum, j| {
+                    sum + rows[k][j] * Interval::point(point[j] - from[j])
                 });
                 let slack = 1e-9 * (1.0 + jet.gradient[k].abs());
                 let around = Interval::new(form.lo - slack, form.hi + slack);
