@@ -87,13 +87,12 @@ const MOST_FACES: u32 = 200_000;
 const AIM: f64 = 0.5;
 /// Least error that needs no fewer faces.
 const LEAST: f64 = 1.0 / 3.0;
-/// What mending lowers the worst curves by: the few faces beside them are split.
-const MENDED: f64 = 3.0;
 /// Error estimated from curves up to which the surface is made.
 const PROMISING: f64 = 0.95;
 /// Error of a surface beside that of its curves, where none was made yet: 1.0 to 1.5 on coarse
-/// meshes, up to 4 where sweeps end before the finest are done.
-const FIRST_RATIO: f64 = 1.4;
+/// meshes, up to 4 where sweeps end before the finest are done, and a third of that where the few
+/// faces beside the worst curves are split.
+const FIRST_RATIO: f64 = 0.5;
 /// The error falls by this power of the faces where two rounds do not tell; 3.5 to 4 in the long
 /// run, less or more where meshes are of chance quality.
 const ORDER: f64 = 3.0;
@@ -200,7 +199,7 @@ impl<'a> Search<'a> {
         }
         let same = |r: &&Round| r.faces == round.faces && !r.is_of_curves();
         match self.rounds.iter().find(same).unwrap_or(round).found {
-            Found::Curves { curves } => curves * self.ratio / MENDED,
+            Found::Curves { curves } => curves * self.ratio,
             Found::Surface { surface: Some(surface), sound: true, .. } => surface,
             Found::Surface { .. } | Found::Refused { .. } | Found::TooMany => f64::INFINITY,
         }

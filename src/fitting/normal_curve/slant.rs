@@ -36,7 +36,10 @@ impl Slant {
     pub fn between(chord: &Vec3, ccw: &Vec3, cw: &Vec3, normal: &Vec3) -> Self {
         let (left, right) = (angle(chord, ccw, normal), angle(cw, chord, normal));
         let flat = |v: &Vec3| (v - v.dot(normal) * normal).norm();
-        let beside = |v: &Vec3, a: f64| BESIDE * flat(v) * libm::sin(a).max(0.0) / flat(chord);
+        let beside = |v: &Vec3, a: f64| match a < std::f64::consts::PI {
+            true => BESIDE * flat(v) * libm::sin(a) / flat(chord),
+            false => f64::INFINITY,
+        };
         let narrow = |a: f64, b: f64| (SHARE * a).min(SHARE * (std::f64::consts::PI - b));
         let turn = |a: f64, b: f64| libm::tan(narrow(a, b).clamp(0.0, MAX_TURN));
         Self([-turn(right, left).min(beside(cw, right)), turn(left, right).min(beside(ccw, left))])
@@ -72,7 +75,8 @@ mod tests {
         };
         close(range_deg(60.0, -60.0), [-20.0, 20.0]);
         close(range_deg(30.0, -90.0), [-20.0, 13.5]);
-        close(range_deg(60.0, -174.0), [-20.0, 2.7]);
+        // A corner at 174 degrees lies a tenth of its distance beside the chord.
+        close(range_deg(60.0, -174.0), [-6f64.to_radians().sin().atan().to_degrees(), 2.7]);
         close(range_deg(200.0, -60.0), [0.0, 20.0]);
     }
 
