@@ -120,6 +120,9 @@ fn a_folder_is_checked_without_its_model_file() {
         "flipped_patches",
         "vertex_error_max",
         "lambda0_out_of_range",
+        "lambda0_min",
+        "lambda0_max",
+        "quality_min",
         "repairs",
         "pass",
     ] {

@@ -9,7 +9,7 @@ use crate::report::{CheckReport, Place, worse};
 use crate::sector::{self, Weights};
 use crate::surface::Surface;
 use crate::topology::Topology;
-use crate::{foot, verdict};
+use crate::{foot, quality, verdict};
 use isospline_geometry::Vec3;
 use isospline_implicit::{Field, Jet1};
 use std::collections::BTreeMap;
@@ -114,6 +114,7 @@ impl Parts {
             lambda0_out_of_range: weights.out_of_range,
             lambda0_min: weights.min,
             lambda0_max: weights.max,
+            quality_min: quality::least(surface),
             not_finite: self.not_finite,
             repairs: job.repairs.clone(),
             worst_error: worst.map(|(d, place)| Place { value: d / diagonal, ..place }),

@@ -14,6 +14,7 @@ mod foot;
 mod lent_threads;
 mod nesting;
 mod params;
+mod quality;
 mod report;
 mod sector;
 mod surface;

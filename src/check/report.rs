@@ -62,6 +62,8 @@ pub struct CheckReport {
     pub lambda0_min: f64,
     /// Largest `lambda0`.
     pub lambda0_max: f64,
+    /// Least quality of a triangle of vertices: 1 if equilateral, 0 if flat.
+    pub quality_min: f64,
     /// Control points, vertices and samples whose coordinates, field value or gradient are not
     /// finite numbers, or whose gradient vanishes.
     pub not_finite: u64,

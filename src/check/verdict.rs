@@ -79,6 +79,7 @@ fn unlimited(out: &mut Vec<String>, report: &CheckReport) {
         ("normal_error_deg_max", report.normal_error_deg_max),
         ("lambda0_min", report.lambda0_min),
         ("lambda0_max", report.lambda0_max),
+        ("quality_min", report.quality_min),
     ];
     for (name, _) in figures.into_iter().filter(|(_, value)| !value.is_finite()) {
         out.push(format!("{name} is not a finite number"));

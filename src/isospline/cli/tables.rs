@@ -78,5 +78,8 @@ fn figures(report: &CheckReport, file: &ModelFile) -> Vec<(&'static str, String,
         ("vertex error / diagonal", small(report.vertex_error_max), small(params.vertices)),
         ("flipped patches", report.flipped_patches.to_string(), params.flipped_patches.to_string()),
         ("lambda0 out of (0, 1)", report.lambda0_out_of_range.to_string(), "0".to_owned()),
+        ("lambda0 min", format!("{:.3}", report.lambda0_min), none()),
+        ("lambda0 max", format!("{:.3}", report.lambda0_max), none()),
+        ("face quality min", format!("{:.3}", report.quality_min), none()),
     ]
 }
