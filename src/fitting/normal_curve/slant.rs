@@ -36,9 +36,9 @@ impl Slant {
     pub fn between(chord: &Vec3, ccw: &Vec3, cw: &Vec3, normal: &Vec3) -> Self {
         let (left, right) = (angle(chord, ccw, normal), angle(cw, chord, normal));
         let flat = |v: &Vec3| (v - v.dot(normal) * normal).norm();
-        let beside = |v: &Vec3, a: f64| match a < std::f64::consts::PI {
-            true => BESIDE * flat(v) * libm::sin(a) / flat(chord),
-            false => f64::INFINITY,
+        let tan_beside = |v: &Vec3, a: f64| BESIDE * flat(v) * libm::sin(a) / flat(chord);
+        let beside = |v: &Vec3, a: f64| {
+            if a < std::f64::consts::PI { tan_beside(v, a) } else { f64::INFINITY }
         };
         let narrow = |a: f64, b: f64| (SHARE * a).min(SHARE * (std::f64::consts::PI - b));
         let turn = |a: f64, b: f64| libm::tan(narrow(a, b).clamp(0.0, MAX_TURN));
