@@ -57,6 +57,16 @@ fn a_mended_surface_is_fresh_and_a_note_cut_short_makes_the_same_again() {
 }
 
 #[test]
+fn a_shorter_search_after_a_longer_one_ends_as_it_would_have_alone() {
+    let (alone, after) = (Sandbox::new(), Sandbox::new());
+    let short = ["--set", "target.mends=1"];
+    let code = run(&alone, &short);
+    assert_eq!(run(&after, &[]), 0);
+    assert_eq!(run(&after, &short), code);
+    assert_eq!(after.artifacts(), alone.artifacts());
+}
+
+#[test]
 fn the_library_mends_folds_as_the_program_does() {
     let field = ClosureField::new(1.0, |p: Vec3| {
         let (x2, y2) = (p.x * p.x, p.y * p.y);

@@ -42,6 +42,12 @@ impl Mending {
             || last.len() > limit
     }
 
+    /// The first surface and at most `most` further ones: what a search of that length knows.
+    pub(crate) fn up_to(mut self, most: u32) -> Self {
+        self.0.truncate(most as usize + 1);
+        self
+    }
+
     /// What is split in the surface to be made next: the unfit faces, surface after surface.
     pub(crate) fn tried(&self) -> &[Vec<Place>] {
         &self.0
@@ -104,6 +110,7 @@ mod tests {
         assert!(after(&[0]).is_over(6, 1000) && after(&[0]).kept().is_empty());
         assert!(!after(&[3, 1]).is_over(6, 1000) && after(&[3, 1, 0]).is_over(6, 1000));
         assert_eq!(after(&[3, 1, 0]).kept().len(), 2);
+        assert_eq!(after(&[3, 1, 0]).up_to(1), after(&[3, 1]));
     }
 
     #[test]

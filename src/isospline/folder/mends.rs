@@ -84,7 +84,9 @@ impl ModelFolder {
     }
 
     fn noted_mending(&self, faces: u32) -> Result<Mending, StoreError> {
-        Ok(self.mends()?.remove(&faces).unwrap_or_default())
+        // A longer search before this one must not show in its outcome.
+        let mending = self.mends()?.remove(&faces).unwrap_or_default();
+        Ok(mending.up_to(self.model.file.target.mends))
     }
 
     fn mends(&self) -> Result<BTreeMap<u32, Mending>, StoreError> {

@@ -210,16 +210,18 @@ impl ModelFolder {
     /// All that the rounds depend on: the surfaces, how folds are mended, the limits.
     fn rounds_key(&self) -> String {
         let ModelFile { target, check, .. } = &self.model.file;
-        let tolerance = (target.tolerance, target.tolerance_abs);
-        serde_json::json!([self.surfaces_key(), target.mends, tolerance, check]).to_string()
+        serde_json::json!([self.surfaces_key(), target.mends, check]).to_string()
     }
 
-    /// All that surfaces depend on but their faces: model, parameters, versions of the stages.
+    /// All that surfaces, and which of their patches are unfit, depend on but their faces: model,
+    /// parameters, versions of the stages, tolerance.
     pub(super) fn surfaces_key(&self) -> String {
         let graph = self.sized_graph(crate::tolerance::FIRST_FACES, &[]);
         let params: Vec<_> = graph.nodes.iter().map(|node| (&node.stage, &node.params)).collect();
         let versions: Vec<_> = self.registry.stages().map(|s| (s.name, s.version)).collect();
-        serde_json::json!([self.key.content, params, versions]).to_string()
+        let target = &self.model.file.target;
+        let tolerance = (target.tolerance, target.tolerance_abs);
+        serde_json::json!([self.key.content, params, versions, tolerance]).to_string()
     }
 }
 
