@@ -39,8 +39,8 @@ pub const DEFAULT_FACES: u32 = 2000;
 /// A tenth of what values of fields are rounded to, times the diagonal, where formulas are kind.
 const LEAST_TOLERANCE: f64 = 1e-12;
 
-/// Surfaces made at most after one with unfit patches: deccube of 2400 faces takes two, the cube
-/// of the tutorial of SURFER four, and where six do not help more seldom do.
+/// Surfaces made at most after one with unfit patches: deccube of 2400 faces takes two, of 2166
+/// faces five, and where six do not help more seldom do.
 pub const DEFAULT_MENDS: u32 = 6;
 
 /// Largest `target.mends`.
