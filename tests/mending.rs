@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use isospline::{Aabb, CheckParams, ClosureField, MENDS_NOTE, Options, Vec3, convert};
-use isospline_tests::{Sandbox, config_path};
+use isospline_tests::{Sandbox, config_path, root};
 
 /// So few faces that patches fold where the two tori meet.
 const FACES: u32 = 400;
@@ -64,6 +64,19 @@ fn a_shorter_search_after_a_longer_one_ends_as_it_would_have_alone() {
     assert_eq!(run(&after, &[]), 0);
     assert_eq!(run(&after, &short), code);
     assert_eq!(after.artifacts(), alone.artifacts());
+}
+
+#[test]
+fn a_given_mesh_with_a_corner_of_two_degrees_is_kept_and_does_not_fold() {
+    let sandbox = Sandbox::new();
+    let mesh = root().join("tests/fixtures/meshes/torus_600.obj").display().to_string();
+    let text = std::fs::read_to_string(config_path("torus")).unwrap();
+    let box_ = "box =";
+    let model =
+        sandbox.write("torus.toml", text.replace(box_, &format!("base_mesh = {mesh:?}\n{box_}")));
+    sandbox.succeeds(&["run", &model.display().to_string(), "--out", "out", "--no-sync"]);
+    let report = sandbox.checked();
+    assert_eq!((&report["faces"], &report["flipped_patches"]), (&600.into(), &0.into()));
 }
 
 #[test]
