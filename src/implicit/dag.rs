@@ -4,11 +4,11 @@
 //! million terms neither overflow the stack nor need a recursive drop. Constants are folded when
 //! a node is made, and `0*a` is 0 whatever a is: zeros of derivatives then vanish by themselves.
 
+use crate::interner::Interner;
 use crate::operation::{self, BinaryOp, UnaryOp};
-use std::collections::BTreeMap;
 
 /// Place of a node in its graph; children have smaller ids than parents.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct NodeId(pub(crate) u32);
 
 impl NodeId {
@@ -18,7 +18,7 @@ impl NodeId {
 }
 
 /// One operation on earlier nodes. Constants are stored by bits, to be comparable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Node {
     Constant(u64),
     /// 0, 1, 2 for x, y, z.
@@ -53,7 +53,7 @@ const LARGEST_POWER: f64 = 64.0;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Dag {
     nodes: Vec<Node>,
-    ids: BTreeMap<Node, NodeId>,
+    ids: Interner,
 }
 
 impl Dag {
@@ -125,12 +125,7 @@ impl Dag {
 
     /// The node itself, found or appended, without simplification.
     pub(crate) fn intern(&mut self, node: Node) -> NodeId {
-        let next = NodeId(u32::try_from(self.nodes.len()).expect("invariant: below 2^32 nodes"));
-        let id = *self.ids.entry(node).or_insert(next);
-        if id == next {
-            self.nodes.push(node);
-        }
-        id
+        self.ids.place(&mut self.nodes, node)
     }
 
     pub(crate) fn constant(&mut self, value: f64) -> NodeId {

@@ -9,6 +9,7 @@
     reason = "the interpreter must be compiled inside the function that enables AVX2"
 )]
 
+use crate::circular;
 use crate::instruction_set::InstructionSet;
 use crate::operation::{self, BinaryOp, UnaryOp};
 use crate::tape::{Instruction, Op, Tape};
@@ -78,7 +79,7 @@ fn block<const N: usize, const K: usize, T>(
         // Idle lanes hold a real point: values far off would cost time (subnormal numbers).
         spare.fill(points[n - 1][axis as usize]);
     }
-    run(&tape.instructions, file);
+    run(&tape.instructions, file, n);
     let outputs: [&[f64; N]; K] = std::array::from_fn(|k| &file[tape.outputs[k] as usize]);
     for (lane, out) in out[..n].iter_mut().enumerate() {
         *out = to_result(outputs.map(|output| output[lane]));
@@ -87,34 +88,34 @@ fn block<const N: usize, const K: usize, T>(
 }
 
 #[cfg(target_arch = "x86_64")]
-fn run<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]]) {
+fn run<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]], used: usize) {
     if InstructionSet::best() >= InstructionSet::Avx2 {
         #[expect(unsafe_code, reason = "calls code compiled for AVX2: half the time of SSE2")]
         // SAFETY: the processor has AVX2, as checked in the line above.
         unsafe {
-            run_avx2(instructions, file);
+            run_avx2(instructions, file, used);
         }
     } else {
-        interpret(instructions, file);
+        interpret(instructions, file, used);
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn run<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]]) {
-    interpret(instructions, file);
+fn run<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]], used: usize) {
+    interpret(instructions, file, used);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn run_avx2<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]]) {
-    interpret(instructions, file);
+fn run_avx2<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]], used: usize) {
+    interpret(instructions, file, used);
 }
 
 #[inline(always)]
-fn interpret<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]]) {
+fn interpret<const N: usize>(instructions: &[Instruction], file: &mut [[f64; N]], used: usize) {
     for instruction in instructions {
         let k = instruction.constant;
-        let mut row = Row { instruction, file };
+        let mut row = Row { instruction, file, used };
         match instruction.op {
             Op::Constant => row.constant(k),
             Op::AddConstant => row.one(|a| a + k),
@@ -145,6 +146,8 @@ fn unary<const N: usize>(row: &mut Row<'_, N>, op: UnaryOp) {
         UnaryOp::Sqrt => row.one(f64::sqrt),
         UnaryOp::HalfInverse => row.one(|a| operation::unless_zero(a, 0.5 / a)),
         UnaryOp::GuardedInverse => row.one(|a| operation::unless_zero(a, 1.0 / a)),
+        UnaryOp::Sin => row.mostly(circular::sine, libm::sin),
+        UnaryOp::Cos => row.mostly(circular::cosine, libm::cos),
         UnaryOp::BlendGap => row.one(operation::blend_gap),
         UnaryOp::BlendSlope => row.one(operation::blend_slope),
         UnaryOp::BlendCurvature => row.one(operation::blend_curvature),
@@ -178,6 +181,8 @@ fn chunks<const N: usize>(register: &[f64; N]) -> &[[f64; 4]] {
 struct Row<'a, const N: usize> {
     instruction: &'a Instruction,
     file: &'a mut [[f64; N]],
+    /// Lanes that hold points of their own.
+    used: usize,
 }
 
 impl<const N: usize> Row<'_, N> {
@@ -200,12 +205,30 @@ impl<const N: usize> Row<'_, N> {
         *self.registers::<0>().0 = [k; N];
     }
 
-    /// For functions too large to be worth compiling twice a length.
+    /// For functions too large to be worth compiling twice a length, and dear enough not to be
+    /// called for idle lanes: a point alone would cost as much as eight.
     #[inline(always)]
     fn each<const A: usize>(&mut self, f: impl Fn([f64; A]) -> f64) {
+        let used = self.used;
         let (out, arguments) = self.registers::<A>();
-        for i in 0..N {
+        for i in 0..used {
             out[i] = f(arguments.map(|argument| argument[i]));
+        }
+        let last = out[used - 1];
+        out[used..].fill(last);
+    }
+
+    /// For functions with a form for most numbers that becomes vector code and gives NaN for the
+    /// others.
+    #[inline(always)]
+    fn mostly(&mut self, usual: impl Fn(f64) -> f64, whole: impl Fn(f64) -> f64) {
+        self.one(usual);
+        let used = self.used;
+        let (out, [argument]) = self.registers::<1>();
+        for i in 0..used {
+            if out[i].is_nan() {
+                out[i] = whole(argument[i]);
+            }
         }
     }
 
@@ -318,8 +341,8 @@ mod tests {
             .map(|lanes| lanes.try_into().unwrap())
             .collect();
         let (mut plain, mut vector) = (start.clone(), start);
-        interpret(&tape.instructions, &mut plain);
-        run(&tape.instructions, &mut vector);
+        interpret(&tape.instructions, &mut plain, 32);
+        run(&tape.instructions, &mut vector, 32);
         for (a, b) in plain.as_flattened().iter().zip(vector.as_flattened()) {
             assert!(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()), "{a:e} {b:e}");
         }

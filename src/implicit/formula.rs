@@ -58,9 +58,9 @@ use std::sync::OnceLock;
 pub struct Formula {
     dag: Dag,
     root: NodeId,
-    values: Tape,
-    value_intervals: Tape,
-    // Derivatives of a formula of a million terms take seconds: compiled when first asked for.
+    // Compiled when first asked for: a formula of a million terms takes seconds and much memory.
+    values: OnceLock<Tape>,
+    value_intervals: OnceLock<Tape>,
     gradients: OnceLock<Tape>,
     gradient_intervals: OnceLock<Tape>,
     hessians: OnceLock<Tape>,
@@ -79,10 +79,9 @@ impl Formula {
     /// The first thing that cannot be read, with its place.
     pub fn parse(text: &str, parameters: &BTreeMap<String, f64>) -> Result<Self, FormulaError> {
         let (dag, root) = parser::parse(text, parameters)?;
-        let tape = |target| compile(&dag, &[root], dag.n_nodes(), target);
         Ok(Self {
-            values: tape(Target::Points),
-            value_intervals: tape(Target::Intervals),
+            values: OnceLock::new(),
+            value_intervals: OnceLock::new(),
             gradients: OnceLock::new(),
             gradient_intervals: OnceLock::new(),
             hessians: OnceLock::new(),
@@ -106,6 +105,23 @@ impl Formula {
             (0..needed.len()).filter(|&row| needed[row]).any(|row| is_axis(&row))
         };
         [occurs(0), occurs(1), occurs(2)]
+    }
+
+    /// How many operations the formula has, each counted once however often it is written.
+    pub fn n_operations(&self) -> usize {
+        canonical::n_definitions(&self.dag, self.root)
+    }
+
+    fn value_tape(&self) -> &Tape {
+        self.values.get_or_init(|| self.value_of(Target::Points))
+    }
+
+    fn value_interval_tape(&self) -> &Tape {
+        self.value_intervals.get_or_init(|| self.value_of(Target::Intervals))
+    }
+
+    fn value_of(&self, target: Target) -> Tape {
+        compile(&self.dag, &[self.root], self.dag.n_nodes(), target)
     }
 
     fn gradient_tape(&self) -> &Tape {
@@ -157,7 +173,7 @@ fn compile(dag: &Dag, roots: &[NodeId], n_values: usize, target: Target) -> Tape
 
 impl Field for Formula {
     fn values(&self, points: &[Vec3], out: &mut [f64]) {
-        evaluator::evaluate::<1, _>(&self.values, points, out, |[f]| f);
+        evaluator::evaluate::<1, _>(self.value_tape(), points, out, |[f]| f);
     }
 
     fn gradients(&self, points: &[Vec3], out: &mut [Jet1]) {
@@ -177,7 +193,7 @@ impl Field for Formula {
     }
 
     fn value_enclosure(&self, domain: [Interval; 3]) -> Option<Interval> {
-        let [value] = enclose(&self.value_intervals, domain);
+        let [value] = enclose(self.value_interval_tape(), domain);
         Some(value)
     }
 
@@ -187,7 +203,7 @@ impl Field for Formula {
     }
 
     fn value_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<Interval>]) {
-        enclose_all::<1, _>(&self.value_intervals, domains, out, |[value]| Some(value));
+        enclose_all::<1, _>(self.value_interval_tape(), domains, out, |[value]| Some(value));
     }
 
     fn gradient_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<IntervalJet>]) {

@@ -1,8 +1,8 @@
-//! Which build of the evaluators runs: that for the widest vectors the processor has.
+//! Which build of hot loops runs: that for the widest vectors the processor has.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// What the evaluators are compiled for, the least first. Results have the same bits in all.
+/// What hot loops are compiled for, the least first. Results have the same bits in all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum InstructionSet {
@@ -10,7 +10,7 @@ pub enum InstructionSet {
     Plain,
     /// Vectors of four floats.
     Avx2,
-    /// Vectors of eight floats; enclosures alone are compiled for it.
+    /// Vectors of eight floats; point evaluators are not compiled for it.
     Avx512,
 }
 
@@ -52,4 +52,56 @@ impl InstructionSet {
     pub fn is_there(self) -> bool {
         self == Self::Plain
     }
+}
+
+/// Work that wide vectors speed up. [`Kernel::run`] and what it calls are to be
+/// `#[inline(always)]`: what is not inlined stays compiled for any processor.
+pub trait Kernel {
+    /// What the work yields.
+    type Output;
+
+    /// Does the work.
+    fn run(self) -> Self::Output;
+}
+
+/// Runs a kernel in the build for [`InstructionSet::best`]; the bits are the same in all.
+#[cfg(target_arch = "x86_64")]
+#[inline]
+pub fn run_widest<K: Kernel>(kernel: K) -> K::Output {
+    match InstructionSet::best() {
+        InstructionSet::Avx512 => {
+            #[expect(unsafe_code, reason = "calls code compiled for AVX-512")]
+            // SAFETY: the processor has it, as `best` checks.
+            unsafe {
+                run_avx512(kernel)
+            }
+        }
+        InstructionSet::Avx2 => {
+            #[expect(unsafe_code, reason = "calls code compiled for AVX2")]
+            // SAFETY: the processor has it, as `best` checks.
+            unsafe {
+                run_avx2(kernel)
+            }
+        }
+        InstructionSet::Plain => kernel.run(),
+    }
+}
+
+/// Runs a kernel; the bits are the same whatever it is compiled for.
+#[cfg(not(target_arch = "x86_64"))]
+#[inline]
+pub fn run_widest<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
 }

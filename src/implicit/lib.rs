@@ -7,6 +7,7 @@
 
 pub mod bounds;
 mod canonical;
+mod circular;
 pub mod closure;
 mod dag;
 mod derivative;
@@ -18,6 +19,7 @@ pub mod formula_error;
 pub mod functions;
 pub mod inside;
 mod instruction_set;
+mod interner;
 pub mod interval;
 mod interval_evaluator;
 mod interval_functions;
@@ -38,5 +40,5 @@ pub use formula_error::{FormulaError, FormulaErrorKind};
 pub use functions::{CONSTANTS, FUNCTIONS, Function, VARIABLES};
 pub use inside::{Inside, InsideError, Side, resolve_inside};
 #[doc(hidden)]
-pub use instruction_set::{InstructionSet, use_at_most};
+pub use instruction_set::{InstructionSet, Kernel, run_widest, use_at_most};
 pub use interval::{Interval, IntervalJet};

@@ -5,7 +5,7 @@
 //! would differ in the last bit from machine to machine.
 
 /// A function of one argument.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum UnaryOp {
     Neg,
     Abs,
@@ -43,7 +43,7 @@ pub(crate) enum UnaryOp {
 }
 
 /// A function of two arguments.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum BinaryOp {
     Add,
     Sub,

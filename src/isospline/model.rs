@@ -128,7 +128,7 @@ impl Model {
         let depends_on = formula.depends_on();
         // Only of a field that has a surface: that there is none would be the better message.
         let is_flat = depends_on.contains(&false) && depends_on.contains(&true);
-        let operations = formula.canonical().lines().count();
+        let operations = formula.n_operations();
         let level = Oriented { inner: &formula, level: model.level, flipped: false };
         let domain = if let Some(domain) = model.domain.given() {
             domain
