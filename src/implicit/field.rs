@@ -1,6 +1,6 @@
 //! What a scalar field answers.
 
-use crate::{Interval, IntervalJet};
+use crate::{AffineJet, Interval, IntervalJet};
 use isospline_geometry::{Mat3, Vec3};
 use std::sync::Arc;
 
@@ -75,6 +75,16 @@ pub trait Field: Send + Sync {
     /// in `grad f(c) + hessian (x - c)`. `None` where that is not known: for fields without
     /// intervals, with kinks, or too long to be worth it; for all boxes then.
     fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
+        assert_eq!(domains.len(), out.len(), "one result a box");
+        out.fill(None);
+    }
+
+    /// Affine forms of value and gradient over many boxes, as [`Affine::middle_and_half`] counts
+    /// their sides: like [`Field::gradient_enclosures`], but too wide by a part that falls with the
+    /// square of the box. `None` where the field has no interval arithmetic.
+    ///
+    /// [`Affine::middle_and_half`]: crate::Affine::middle_and_half
+    fn gradient_forms(&self, domains: &[[Interval; 3]], out: &mut [Option<AffineJet>]) {
         assert_eq!(domains.len(), out.len(), "one result a box");
         out.fill(None);
     }
@@ -194,6 +204,17 @@ impl<F: Field> Field for Oriented<F> {
         self.inner.kinks_between(a, b)
     }
 
+    fn gradient_forms(&self, domains: &[[Interval; 3]], out: &mut [Option<AffineJet>]) {
+        self.inner.gradient_forms(domains, out);
+        for jet in out.iter_mut().flatten() {
+            jet.value = jet.value.minus(self.level);
+            if self.flipped {
+                jet.value = jet.value.negated();
+                jet.gradient = jet.gradient.map(|slope| slope.negated());
+            }
+        }
+    }
+
     fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
         self.inner.hessian_enclosures(domains, out);
         for hessian in out.iter_mut().flatten() {
@@ -250,6 +271,9 @@ macro_rules! forward_field {
                 out: &mut [Option<HessianIntervals>],
             ) {
                 (**self).hessian_enclosures(domains, out);
+            }
+            fn gradient_forms(&self, domains: &[[Interval; 3]], out: &mut [Option<AffineJet>]) {
+                (**self).gradient_forms(domains, out);
             }
             fn kinks_between(&self, a: Vec3, b: Vec3) -> Vec<&'static str> {
                 (**self).kinks_between(a, b)

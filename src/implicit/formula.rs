@@ -26,6 +26,7 @@
 //! Enclosures of derivatives hold every one-sided derivative (a kink gives the hull of both
 //! sides); over a jump they are unbounded, so the mean value theorem holds with them.
 
+use crate::affine_lanes;
 use crate::dag::{Dag, Node, NodeId};
 use crate::evaluator;
 use crate::formula_error::FormulaError;
@@ -34,7 +35,7 @@ use crate::interval_lanes::enclose_all;
 use crate::kinks;
 use crate::lowering::{self, Target};
 use crate::tape::Tape;
-use crate::{Field, HessianIntervals, Interval, IntervalJet, Jet1, Jet2};
+use crate::{AffineJet, Field, HessianIntervals, Interval, IntervalJet, Jet1, Jet2};
 use crate::{canonical, derivative, parser};
 use isospline_geometry::Vec3;
 use std::collections::BTreeMap;
@@ -210,6 +211,13 @@ impl Field for Formula {
         let tape = self.gradient_interval_tape();
         enclose_all::<4, _>(tape, domains, out, |[value, x, y, z]| {
             Some(IntervalJet { value, gradient: [x, y, z] })
+        });
+    }
+
+    fn gradient_forms(&self, domains: &[[Interval; 3]], out: &mut [Option<AffineJet>]) {
+        let tape = self.gradient_interval_tape();
+        affine_lanes::enclose_all::<4, _>(tape, domains, out, |[value, x, y, z]| {
+            Some(AffineJet { value, gradient: [x, y, z] })
         });
     }
 

@@ -3,8 +3,10 @@
 //! Text becomes tokens (`lexer`), a graph without equal nodes (`parser`, `dag`), derivatives
 //! in the same graph (`derivative`), elementary operations (`lowering`) and instructions on
 //! few registers (`tape`), which run over blocks of points (`evaluator`) or over boxes
-//! (`interval_evaluator`). Model files of other programs become text (`foreign`).
+//! (`interval_evaluator`, `affine_lanes`). Model files of other programs become text (`foreign`).
 
+mod affine;
+mod affine_lanes;
 pub mod bounds;
 mod canonical;
 mod circular;
@@ -31,6 +33,7 @@ mod operation;
 mod parser;
 mod tape;
 
+pub use affine::{Affine, AffineJet};
 pub use bounds::{BoundsError, auto_box};
 pub use closure::ClosureField;
 pub use field::{Field, HessianIntervals, Jet1, Jet2, Oriented, SymMat3};

@@ -2,7 +2,7 @@
 
 use exmex::Express as _;
 use isospline_geometry::Vec3;
-use isospline_implicit::{Field, Formula, Interval, IntervalJet};
+use isospline_implicit::{Affine, AffineJet, Field, Formula, Interval, IntervalJet};
 use num_dual::{DualNum, HyperDual64};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -189,6 +189,46 @@ proptest! {
             for k in (0..3).filter(|_| !jet.value.is_nan()) {
                 let slope = jet.gradient[k];
                 prop_assert!(slope.is_nan() || gradient[k].contains(slope), "{} d{k}: {slope} not in {:?}", e.text(), gradient[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn values_and_gradients_lie_in_their_affine_forms(
+        e in any_expression(),
+        at in points(),
+        size in prop::array::uniform3(0.0..1.0_f64),
+        shares in prop::collection::vec(prop::array::uniform3(0.0..=1.0_f64), 12),
+    ) {
+        let field = formula(&e);
+        let domain: [Interval; 3] =
+            std::array::from_fn(|k| Interval::new(at[k], at[k] + size[k] * size[k]));
+        let mut jets = [None];
+        field.gradient_forms(&[domain], &mut jets);
+        let AffineJet { value, gradient } = jets[0].unwrap();
+        let sides = domain.map(Affine::middle_and_half);
+        for share in shares {
+            let point = Vec3::from_fn(|k, _| {
+                (domain[k].lo + share[k] * domain[k].width()).clamp(domain[k].lo, domain[k].hi)
+            });
+            let offset: [f64; 3] = std::array::from_fn(|k| {
+                let [middle, half] = sides[k];
+                if half > 0.0 { (point[k] - middle) / half } else { 0.0 }
+            });
+            let jet = field.gradient(point);
+            let pairs = [(value, jet.value), (gradient[0], jet.gradient.x),
+                (gradient[1], jet.gradient.y), (gradient[2], jet.gradient.z)];
+            for (form, found) in pairs {
+                let linear = form.middle + (0..3).map(|k| form.slopes[k] * offset[k]).sum::<f64>();
+                // What the point evaluation rounds, some of it of larger terms.
+                let slack = 1e-9 * (1.0 + found.abs() + form.middle.abs());
+                let is_known = linear.is_finite() && form.rest.is_finite();
+                // Where there is no value there is no slope.
+                let is_there = !jet.value.is_nan() && !found.is_nan();
+                prop_assert!(
+                    !is_known || !is_there || (found - linear).abs() <= form.rest + slack,
+                    "{}: {found} not in {form:?} at {offset:?}", e.text()
+                );
             }
         }
     }

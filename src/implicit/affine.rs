@@ -1,0 +1,279 @@
+//! Affine forms: what of a function is linear over a box, and how far it may be from that.
+//!
+//! Unlike [`crate::interval`] a form encloses exact values alone, not what rounding makes of the
+//! formula at a point. \[derived\] Each operation keeps the linear part of its result and adds a
+//! bound of all else to the rest: of a product the products of the linear parts, of a function
+//! `g(a) = g(m) + s (a - m)`, s between the slopes that g has over the values of a.
+
+use crate::interval::Interval;
+use crate::operation::{BinaryOp, UnaryOp};
+use crate::tape::{Instruction, Op};
+
+/// Rounding of a product, of the product of the sizes of the factors: ten roundings of 2^-53 of
+/// parts of it, and as much again.
+pub(crate) const MUL_ROUNDING: f64 = 2e-15;
+/// Rounding of a sum, of the size of the result: one of 2^-53 each part, and as much again.
+pub(crate) const ADD_ROUNDING: f64 = 2.5e-16;
+/// Covers the roundings of a rest itself, a dozen sums and products of positive numbers.
+pub(crate) const REST_ROUNDING: f64 = 1.0 + 4e-15;
+/// Covers what products below the least normal number lose.
+pub(crate) const TINY: f64 = 1e-300;
+
+/// `middle + slopes . e`, up to `rest` more or less, at the points of a box that lie `e` half sides
+/// off its middle, `|e_k| <= 1`. Figures that are not finite mean "nothing known".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Affine {
+    /// The value in the middle, or near it.
+    pub middle: f64,
+    /// Change from the middle to each upper side.
+    pub slopes: [f64; 3],
+    /// How far the value may be from the linear one.
+    pub rest: f64,
+}
+
+/// Forms of a value and its gradient over a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AffineJet {
+    /// The value.
+    pub value: Affine,
+    /// Each partial derivative; where the gradient jumps, all between its limits.
+    pub gradient: [Affine; 3],
+}
+
+impl Affine {
+    const UNKNOWN: Self = Self { middle: f64::NAN, slopes: [0.0; 3], rest: f64::NAN };
+
+    /// The middle of a side of a box and half its length, rounded up: the unit of forms over it.
+    pub fn middle_and_half(side: Interval) -> [f64; 2] {
+        let middle = side.midpoint();
+        let half = (side.hi - middle).max(middle - side.lo);
+        [middle, if half > 0.0 { half.next_up() } else { half }]
+    }
+
+    /// How far the value may be from that in the middle.
+    pub fn reach(&self) -> f64 {
+        self.linear_reach() + self.rest
+    }
+
+    /// All values that the form may have.
+    pub fn interval(&self) -> Interval {
+        let reach = self.reach() * REST_ROUNDING;
+        let values =
+            Interval::new((self.middle - reach).next_down(), (self.middle + reach).next_up());
+        if values.lo.is_finite() && values.hi.is_finite() { values } else { Interval::UNKNOWN }
+    }
+
+    /// The coordinate along `axis` of a box with this side.
+    pub(crate) fn coordinate(axis: usize, side: Interval) -> Self {
+        let [middle, half] = Self::middle_and_half(side);
+        let mut slopes = [0.0; 3];
+        slopes[axis] = half;
+        Self { middle, slopes, rest: 0.0 }
+    }
+
+    /// `{-a}`.
+    pub(crate) fn negated(&self) -> Self {
+        Self { middle: -self.middle, slopes: self.slopes.map(|s| -s), rest: self.rest }
+    }
+
+    /// `{a - shift}`.
+    pub(crate) fn minus(&self, shift: f64) -> Self {
+        let middle = self.middle - shift;
+        let rest = (self.rest + ADD_ROUNDING * middle.abs()) * REST_ROUNDING;
+        Self { middle, rest, ..*self }
+    }
+
+    fn linear_reach(&self) -> f64 {
+        let [x, y, z] = self.slopes;
+        (x.abs() + y.abs() + z.abs()) * REST_ROUNDING
+    }
+
+    /// Any values of an interval.
+    fn any_of(values: Interval) -> Self {
+        let [middle, rest] = Self::middle_and_half(values);
+        let is_known = middle.is_finite() && rest.is_finite();
+        if is_known { Self { middle, slopes: [0.0; 3], rest } } else { Self::UNKNOWN }
+    }
+
+    /// `a + sign * b`.
+    fn plus(&self, b: &Self, sign: f64) -> Self {
+        let slopes = std::array::from_fn(|k| self.slopes[k] + sign * b.slopes[k]);
+        let sum = Self { middle: self.middle + sign * b.middle, slopes, rest: 0.0 };
+        let size = sum.middle.abs() + sum.linear_reach();
+        Self { rest: (self.rest + b.rest + ADD_ROUNDING * size) * REST_ROUNDING, ..sum }
+    }
+
+    /// `{a * b}` for the same point: of the products of the linear parts squares lie within
+    /// `[0, 1]`, others within `[-1, 1]`.
+    fn times(&self, b: &Self) -> Self {
+        let a = self;
+        let (mut sum, mut squares, mut mixed) = (0.0, 0.0, 0.0);
+        for k in 0..3 {
+            let j = (k + 1) % 3;
+            let square = a.slopes[k] * b.slopes[k];
+            sum += square;
+            squares += square.abs();
+            mixed += (a.slopes[k] * b.slopes[j] + a.slopes[j] * b.slopes[k]).abs();
+        }
+        let slopes = std::array::from_fn(|k| a.middle * b.slopes[k] + b.middle * a.slopes[k]);
+        let (a_size, b_size) =
+            (a.middle.abs() + a.linear_reach(), b.middle.abs() + b.linear_reach());
+        let rest = 0.5 * squares + mixed + a.rest * (b_size + b.rest) + b.rest * a_size;
+        let rest = (rest + MUL_ROUNDING * (a_size * b_size)) * REST_ROUNDING + TINY;
+        Self { middle: a.middle * b.middle + 0.5 * sum, slopes, rest }
+    }
+
+    /// `g(a)` by its value in the middle and an enclosure of its slopes over all values of a; `plain`
+    /// holds all its values and is taken where it is narrower.
+    fn linearised(&self, at_middle: Interval, slope: Interval, plain: Interval) -> Self {
+        let [factor, spread] = Self::middle_and_half(slope);
+        let start = Self::any_of(at_middle);
+        let slopes = self.slopes.map(|s| factor * s);
+        let rounding = MUL_ROUNDING * (factor.abs() * self.reach());
+        let rest = start.rest + spread * self.reach() + factor.abs() * self.rest + rounding;
+        let form = Self { middle: start.middle, slopes, rest: rest * REST_ROUNDING + TINY };
+        let plain = Self::any_of(plain);
+        if form.rest < plain.rest || plain.rest.is_nan() { form } else { plain }
+    }
+
+    fn unary(&self, op: UnaryOp) -> Self {
+        use UnaryOp as U;
+        let x = self.interval();
+        let plain = x.unary(op);
+        let one = Interval::point(1.0);
+        let slope = match op {
+            U::Neg => return self.negated(),
+            U::Abs if x.lo >= 0.0 => return *self,
+            U::Abs if x.hi <= 0.0 => return self.negated(),
+            U::Abs => x.unary(U::Sign),
+            U::Sqrt if x.lo > 0.0 => Interval::point(0.5) / plain,
+            U::Exp => plain,
+            U::Ln if x.lo > 0.0 => one / x,
+            U::Sin => x.unary(U::Cos),
+            U::Cos => -x.unary(U::Sin),
+            U::Atan => one / (one + x.power(2)),
+            U::Tanh => one - plain.power(2),
+            U::Sinh => x.unary(U::Cosh),
+            U::Cosh => x.unary(U::Sinh),
+            U::HalfInverse if !x.may_be_zero() => Interval::point(-0.5) / x.power(2),
+            U::GuardedInverse if !x.may_be_zero() => -one / x.power(2),
+            U::BlendSlope => x.unary(U::BlendCurvature),
+            _ => return Self::any_of(plain),
+        };
+        self.linearised(Interval::point(self.middle).unary(op), slope, plain)
+    }
+
+    fn power(&self, n: i32) -> Self {
+        let x = self.interval();
+        let slope = Interval::point(f64::from(n)) * x.power(n - 1);
+        self.linearised(Interval::point(self.middle).power(n), slope, x.power(n))
+    }
+
+    fn binary(&self, op: BinaryOp, b: &Self) -> Self {
+        let (x, y) = (self.interval(), b.interval());
+        match op {
+            BinaryOp::Div if !y.may_be_zero() => self.times(&b.power(-1)),
+            BinaryOp::Min if x.hi <= y.lo => *self,
+            BinaryOp::Min if y.hi <= x.lo => *b,
+            BinaryOp::Max if x.lo >= y.hi => *self,
+            BinaryOp::Max if y.lo >= x.hi => *b,
+            _ => Self::any_of(x.binary(op, y)),
+        }
+    }
+
+    /// `smin(a, b, k) = (a + b)/2 - h(a - b)`: the mean is linear, and h has the slope that
+    /// [`UnaryOp::BlendSlope`] gives.
+    fn blend(a: &Self, b: &Self, k: &Self) -> Self {
+        let plain = Interval::blend(a.interval(), b.interval(), k.interval());
+        let is_constant = k.rest == 0.0 && k.linear_reach() == 0.0;
+        if !is_constant || plain.is_unknown() {
+            return Self::any_of(plain);
+        }
+        let (half, k) = (Interval::point(0.5), Interval::point(k.middle));
+        let h = |gap: Interval| {
+            let t = gap / k;
+            k * (half * t.abs() + t.unary(UnaryOp::BlendGap))
+        };
+        let gap = a.plus(b, -1.0);
+        let slope = (gap.interval() / k).unary(UnaryOp::BlendSlope);
+        let lost = gap.linearised(h(Interval::point(gap.middle)), slope, h(gap.interval()));
+        let mean = a.plus(b, 1.0).times(&Self::any_of(half));
+        mean.plus(&lost, -1.0)
+    }
+
+    /// `p` where the condition is not zero, else `q`; any of both where it is undecided.
+    fn select(condition: &Self, p: &Self, q: &Self) -> Self {
+        let condition = condition.interval();
+        if !condition.may_be_zero() {
+            *p
+        } else if condition.lo == 0.0 && condition.hi == 0.0 {
+            *q
+        } else {
+            Self::any_of(p.interval().hull(q.interval()))
+        }
+    }
+}
+
+/// The result of one instruction from its arguments.
+pub(crate) fn step(instruction: &Instruction, argument: impl Fn(usize) -> Affine) -> Affine {
+    match instruction.op {
+        Op::Constant => Affine::any_of(Interval::point(instruction.constant)),
+        Op::Unary(op) => argument(0).unary(op),
+        Op::Binary(BinaryOp::Add) => argument(0).plus(&argument(1), 1.0),
+        Op::Binary(BinaryOp::Sub) => argument(0).plus(&argument(1), -1.0),
+        Op::Binary(BinaryOp::Mul) => argument(0).times(&argument(1)),
+        Op::Binary(op) => argument(0).binary(op, &argument(1)),
+        Op::Power(0) => Affine::any_of(Interval::point(1.0)),
+        Op::Power(n) => argument(0).power(n),
+        Op::Blend => Affine::blend(&argument(0), &argument(1), &argument(2)),
+        Op::Select => Affine::select(&argument(0), &argument(1), &argument(2)),
+        _ => unreachable!("invariant: {:?} is fused for points only", instruction.op),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Affine, AffineJet, Field, Formula, Interval};
+    use std::collections::BTreeMap;
+
+    fn value(text: &str, domain: [Interval; 3]) -> Affine {
+        let mut jets: [Option<AffineJet>; 1] = [None];
+        Formula::parse(text, &BTreeMap::new()).unwrap().gradient_forms(&[domain], &mut jets);
+        jets[0].unwrap().value
+    }
+
+    #[test]
+    fn the_factors_of_a_product_move_together() {
+        let unit = [Interval::new(0.0, 1.0); 3];
+        let found = value("x*(1 - x)", unit).interval();
+        assert!(found.lo > -1e-12 && found.hi < 0.25 + 1e-12, "{found:?}");
+        let found = value("3*(x - y) + y - (x - y)*2 - x", unit).interval();
+        assert!(found.hi - found.lo < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn the_rest_falls_with_the_square_of_the_box() {
+        for text in [
+            "x*y*z + x^5",
+            "sin(x)*exp(y) + sqrt(z + 2)/(x + 3)",
+            "ln(x) + atan(y) + tanh(z) + cosh(x) - sinh(y) + cos(z)",
+            "smin(x, y, 0.7) + smax(x*y, z, 0.6)",
+            "x^-3 + abs(y) + min(x, y + 9) - max(z, x - 9)",
+        ] {
+            let rest = |half: f64| {
+                let side = |at: f64| Interval::new(at - half, at + half);
+                value(text, [side(0.9), side(0.8), side(0.7)]).rest
+            };
+            let ratio = rest(1e-3) / rest(5e-4);
+            assert!((3.5..=4.5).contains(&ratio), "{text}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn what_is_undefined_in_the_box_is_unknown() {
+        let around_zero = [Interval::new(-1.0, 2.0); 3];
+        for text in ["sqrt(x)", "1/x", "ln(y) + x", "tan(3*z)"] {
+            assert!(value(text, around_zero).interval().is_unknown(), "{text}");
+        }
+    }
+}
