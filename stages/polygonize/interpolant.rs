@@ -2,42 +2,10 @@
 
 use crate::complex::{Complex, EDGES, Tetrahedron};
 use isospline_geometry::Vec3;
-use isospline_implicit::{HessianIntervals, Interval};
+use isospline_implicit::Interval;
 
 /// Margin for the rounding of the interpolant, relative to the terms that are summed.
-const ROUNDING: f64 = 1e-10;
-
-/// Places of the rows of a symmetric matrix in `[xx, xy, xz, yy, yz, zz]`.
-pub(crate) const HESSIAN_ROWS: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-
-/// `grad f(m) + H d` for `|d| <= radius` by components, m the middle of a box: what all
-/// tetrahedra there share of the test of second order.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Bend {
-    /// Middle and half width of `grad f(m)`.
-    slope: [Vec3; 2],
-    /// Middles and half widths of the columns of `H` times the radius of their axis.
-    turns: [[Vec3; 2]; 3],
-    /// Size of the terms of each component.
-    size: Vec3,
-}
-
-impl Bend {
-    /// From enclosures of `grad f(m)` and of the second derivatives over the box.
-    pub(crate) fn new(slope: &[Interval; 3], hessian: &HessianIntervals, radius: &Vec3) -> Self {
-        let split = |i: &Interval| [0.5 * (i.lo + i.hi), 0.5 * (i.hi - i.lo)];
-        let column = |k: usize| {
-            let entries =
-                HESSIAN_ROWS[k].map(|at| split(&hessian[at]).map(|part| part * radius[k]));
-            [0, 1].map(|part| Vec3::from(entries.map(|entry| entry[part])))
-        };
-        let turns = [0, 1, 2].map(column);
-        let slopes = [0, 1, 2].map(|k| split(&slope[k]));
-        let slope = [0, 1].map(|part| Vec3::from(slopes.map(|slope| slope[part])));
-        let sizes = [slope].iter().chain(&turns).map(|[middle, half]| middle.abs() + half).sum();
-        Self { slope, turns, size: sizes }
-    }
-}
+pub(crate) const ROUNDING: f64 = 1e-10;
 
 /// The linear interpolant L of the node values on a tetrahedron T.
 #[derive(Clone, Copy, Debug)]
@@ -48,8 +16,9 @@ pub(crate) struct Interpolant {
     barycentric: [Vec3; 3],
     /// Gradient of L.
     pub(crate) gradient: Vec3,
-    least: f64,
-    most: f64,
+    /// Least and largest node value.
+    pub(crate) least: f64,
+    pub(crate) most: f64,
 }
 
 impl Interpolant {
@@ -87,24 +56,6 @@ impl Interpolant {
         least > ROUNDING * size && enclosure.iter().all(|i| i.lo.is_finite() && i.hi.is_finite())
     }
 
-    /// `grad L . grad f > 0` on the box of a [`Bend`].
-    pub(crate) fn is_transversal_along(&self, bend: &Bend) -> bool {
-        let [middle, half] = &bend.slope;
-        let spreads = self.spreads(bend);
-        let least = self.gradient.dot(middle) - self.gradient.abs().dot(half);
-        let size = self.gradient.abs().dot(&bend.size);
-        // Unbounded slopes make the spread infinite or NaN: nothing is proved.
-        least - (spreads.x + spreads.y + spreads.z) > ROUNDING * size && size.is_finite()
-    }
-
-    /// How far `(grad L . H) . d` reaches on the box, by the components of d.
-    pub(crate) fn spreads(&self, bend: &Bend) -> Vec3 {
-        let sizes = self.gradient.abs();
-        Vec3::from(
-            bend.turns.map(|[middle, half]| self.gradient.dot(&middle).abs() + sizes.dot(&half)),
-        )
-    }
-
     /// `f`, enclosed by `value`, and `L` are both positive or both negative on what the box
     /// shares with T.
     pub(crate) fn has_sign_of(&self, value: Interval, middle: Vec3, radius: Vec3) -> bool {
@@ -115,15 +66,14 @@ impl Interpolant {
         (value.lo > 0.0 && lo > 0.0) || (value.hi < 0.0 && hi < 0.0)
     }
 
-    /// `L` is positive or negative on what the box shares with T.
-    pub(crate) fn has_sign(&self, middle: Vec3, radius: Vec3) -> bool {
-        let (lo, hi) = self.range(middle, radius);
-        lo > 0.0 || hi < 0.0
+    /// The linear function L at any place.
+    pub(crate) fn at(&self, place: Vec3) -> f64 {
+        self.values[0] + self.gradient.dot(&(place - self.corners[0]))
     }
 
     /// Bounds of `L` on what the box shares with T.
     fn range(&self, middle: Vec3, radius: Vec3) -> (f64, f64) {
-        let center = self.values[0] + self.gradient.dot(&(middle - self.corners[0]));
+        let center = self.at(middle);
         let rounding = ROUNDING * self.least.abs().max(self.most.abs());
         let spread = self.gradient.abs().dot(&radius) + rounding;
         // On T the interpolant also stays between the node values.

@@ -13,21 +13,20 @@
 //!
 //! [`TopologyProof::Certified`] is stored if in addition, by interval arithmetic with outward
 //! rounding, f does not vanish on the sides of the box, nor on cells that were pruned, and every
-//! remaining tetrahedron T with linear interpolant L of its node values passes: each box of a
-//! cover of T has either f and L of one strict sign, or `grad L . g > 0` for all g in the
-//! enclosure of grad f. Then the separating surface is isotopic to `f = 0` in the box: the same
+//! remaining tetrahedron T with linear interpolant L of its node values passes: `grad L . g > 0`
+//! for all g in the enclosure of grad f wherever, on the boxes of a cover of T, f and L are not
+//! shown to have one strict sign. Then the separating surface is isotopic to `f = 0` in the box: the same
 //! number of components, the same genus of each, nested alike.
 //!
 //! This is the small normal variation of [PV04, Sec. 3] with one of its two interval gradients
-//! replaced by the gradient of the mesh itself. Where the test of [PV04, Sec. 3] holds in a cell
-//! (`0` not in `<G, G>`, G the interval gradient), this one holds for Kuhn's tetrahedra of that
-//! cell, because the components of grad L are difference quotients along axes, hence members
-//! of G. It needs no balanced tree, and boxes may be cut for the test alone.
+//! replaced by the gradient of the mesh itself: the components of grad L are difference quotients
+//! along axes, members of any enclosure of grad f over the cell. It needs no balanced tree, and
+//! boxes may be cut for the test alone.
 //!
 //! Proof \[derived\]. Let `F_s = (1-s) f + s L`, s in \[0, 1\], L continuous over the complex. If
 //! `F_s(x) = 0` for some s, then `f(x) L(x) <= 0`, so x lies in no pruned cell (there f and the
-//! node values, hence L on shared faces, have one sign), and in every tetrahedron T about x the
-//! second alternative holds: `g . a > 0` for `g = grad L` on T and all a in the generalized
+//! node values, hence L on shared faces, have one sign), and in every tetrahedron T about x f and
+//! L have not one strict sign: `g . a > 0` for `g = grad L` on T and all a in the generalized
 //! gradient of f at x. So 0 is in no convex combination of such g and a; the hull of them all
 //! lies in an open half space and a direction v increases every `F_s` near x. A partition of
 //! unity joins such directions to one smooth field v transversal to all the sets `F_s = 0`, which
@@ -69,6 +68,7 @@ mod small_parts;
 mod surface_cells;
 #[cfg(test)]
 mod tests;
+mod transversal;
 
 pub use error::{PolygonizeError, Side};
 pub use params::PolygonizeParams;
@@ -93,7 +93,7 @@ pub struct Polygonize {
 
 impl Stage for Polygonize {
     const NAME: &'static str = "polygonize";
-    const VERSION: u32 = 6;
+    const VERSION: u32 = 7;
     type Params = PolygonizeParams;
     type Whole<'a> = ();
     type Rows<'a> = ();
