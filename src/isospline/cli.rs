@@ -4,6 +4,7 @@ pub(crate) mod args;
 mod batch;
 mod check;
 mod excerpt;
+pub(crate) mod exhausted;
 mod export;
 pub(crate) mod failure;
 mod habits;

@@ -3,11 +3,16 @@
 mod cli;
 
 use clap::Parser;
+use isospline_artifact::Telling;
 use std::panic::{PanicHookInfo, catch_unwind, set_hook};
 use std::process::ExitCode;
 
 /// Raised by Ctrl-C.
 static INTERRUPT: cli::interrupt::Interrupt = cli::interrupt::Interrupt::new();
+
+/// The allocator of all but the library's users, who choose their own.
+#[global_allocator]
+static ALLOCATOR: Telling = Telling::new(|bytes| cli::exhausted::end(bytes, INTERRUPT.is_json()));
 
 fn main() -> ExitCode {
     let args = cli::args::Cli::parse();

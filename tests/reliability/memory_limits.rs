@@ -15,8 +15,8 @@ const LIMITS: [usize; 4] = [256, 128, 64, 48];
 /// allocates, a gigabyte in all, unless it is told to use few arenas.
 const FEW_ARENAS: &str = "MALLOC_ARENA_MAX=2";
 
-/// Exit codes of a clean error: a file, a map or a thread that cannot be had.
-const CLEAN: [i32; 1] = [33];
+/// Exit codes of a clean error: a file, a map or a thread that cannot be had; a failed allocation.
+const CLEAN: [i32; 2] = [33, 34];
 
 pub(super) fn try_all(scale: Scale, tally: &mut Tally) {
     let model = if scale == Scale::Full { "deccube" } else { "torus" };
@@ -48,22 +48,18 @@ fn tried(tally: &mut Tally, sample: &Sample, limit: usize, what: &str, under: &[
     let ran = watched(&mut command, Duration::from_mins(5));
     let made = artifacts(&folder).len();
     let resumed = sample.resumes(&folder).map(drop);
-    let aborted = ran.signal == Some(6) && ran.outcome.stderr.contains("memory allocation");
-    if limit < LIMITS[0] && aborted && resumed.is_ok() {
-        // Rust has no stable way to let a failed allocation be an error everywhere.
-        return tally
-            .known(format!("{what} of {limit} MB"), "told by an abort; the next run goes on");
-    }
     let outcome = judged(&ran, limit).and(resumed);
     let (all, code) = (sample.sound.len(), ran.outcome.code);
     tally.figure(format!("{what} {limit} MB: exit {code}, {made} of {all} stages"));
     tally.case(format!("{what} of {limit} MB"), outcome);
 }
 
+/// Enough, or an end that says what was missing and what to do.
 fn judged(ran: &Ran, limit: usize) -> Result<(), String> {
+    let is_told = ran.outcome.stderr.contains("help: ");
     match ran.outcome.code {
         0 => Ok(()),
-        code if limit < LIMITS[0] && CLEAN.contains(&code) => Ok(()),
+        code if limit < LIMITS[0] && CLEAN.contains(&code) && is_told => Ok(()),
         _ => Err(ran.told()),
     }
 }

@@ -42,6 +42,7 @@ Exit codes:
    31  an artifact is damaged or missing
    32  the folder is in use by another isospline
    33  a file cannot be read or written
+   34  memory ran out; what was finished is kept
    70  a bug of isospline
   130  stopped; what was finished is kept";
 

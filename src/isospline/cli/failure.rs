@@ -11,6 +11,7 @@ use isospline_pipeline::RunError;
 use miette::{Diagnostic, LabeledSpan, SourceCode};
 use std::error::Error;
 use std::fmt;
+use std::io::ErrorKind;
 use std::ops::Range;
 
 /// An error on its way to the terminal.
@@ -58,6 +59,7 @@ const OTHER_VERSION: u8 = 30;
 const DAMAGED: u8 = 31;
 pub(crate) const LOCKED: u8 = 32;
 const IO: u8 = 33;
+pub(crate) const NO_MEMORY: u8 = 34;
 pub(crate) const BUG: u8 = 70;
 pub(crate) const STOPPED: u8 = 130;
 
@@ -173,6 +175,9 @@ impl From<StoreError> for Failure {
                 "locked",
                 "wait for the other run to end, or give another folder with --out",
             ),
+            StoreError::Io { source, .. } if source.kind() == ErrorKind::OutOfMemory => {
+                (NO_MEMORY, "no-memory", MORE_MEMORY)
+            }
             StoreError::Io { .. } => (IO, "input-output", "see whether the folder can be written"),
             _ => return Self::new(BUG, "bug", error.to_string()).helped(REPORT),
         };
@@ -190,6 +195,10 @@ impl From<BatchError> for Failure {
         }
     }
 }
+
+/// What to do where memory runs out; threads take the most of it before they do anything.
+pub(crate) const MORE_MEMORY: &str = "what is finished is kept: run the same command with more memory to go on; fewer --threads \
+     and MALLOC_ARENA_MAX=2 take less";
 
 /// What to do about a bug.
 const REPORT: &str = "this is a bug of isospline: please report it with the model file";
@@ -216,7 +225,7 @@ impl From<RunError> for Failure {
                 .helped("`isospline run` makes everything that is missing"),
             RunError::NoSuchStage { .. } => Self::new(USAGE, "no-such-stage", message),
             RunError::Params { .. } => Self::new(BAD_KEY, "out-of-range", message),
-            RunError::Threads { .. } => Self::new(IO, "threads", message),
+            RunError::Threads { .. } => Self::new(IO, "threads", message).helped(MORE_MEMORY),
             _ => Self::new(BUG, "bug", message).helped(REPORT),
         }
     }

@@ -29,7 +29,7 @@ impl Interrupt {
     pub(crate) fn raise(&self) {
         if self.raised.swap(true, Ordering::SeqCst) || !self.heard.load(Ordering::SeqCst) {
             let told = "stopped; run the same command to go on";
-            if self.json.load(Ordering::SeqCst) {
+            if self.is_json() {
                 let exit = STOPPED;
                 let error = serde_json::json!({
                     "event": "error", "code": "stopped", "exit": exit, "message": told,
@@ -50,6 +50,11 @@ impl Interrupt {
     /// Lets an end at once be told as a line of JSON too.
     pub(crate) fn tells_json(&self, json: bool) {
         self.json.store(json, Ordering::SeqCst);
+    }
+
+    /// Whether it is.
+    pub(crate) fn is_json(&self) -> bool {
+        self.json.load(Ordering::SeqCst)
     }
 
     /// Does work that looks at the flag itself.
