@@ -53,23 +53,48 @@ const fn high(word: u64) -> f64 {
     f64::from_bits(word << 32)
 }
 
-/// The sine, in all bits that of [`libm::sin`], or NaN where it cannot be told.
-#[inline(always)]
-pub(crate) fn sine(x: f64) -> f64 {
-    let angle = Angle::of(x);
-    let (sine, cosine) = (sine_of_quarter(&angle), cosine_of_quarter(&angle));
-    let sine = if x.abs() < TINY { x } else { sine };
-    let of_quadrant = if angle.quadrant & 1 == 0 { sine } else { cosine };
-    signed(of_quadrant, angle.quadrant >> 1, angle.is_told)
+/// A function whose usual form becomes vector code where it stands in a loop.
+pub(crate) trait Circular {
+    /// Its value in all bits, or NaN where the usual form does not do.
+    fn usual(x: f64) -> f64;
+
+    /// Its value.
+    fn whole(x: f64) -> f64;
 }
 
-/// The cosine, likewise.
-#[inline(always)]
-pub(crate) fn cosine(x: f64) -> f64 {
-    let angle = Angle::of(x);
-    let (sine, cosine) = (sine_of_quarter(&angle), cosine_of_quarter(&angle));
-    let of_quadrant = if angle.quadrant & 1 == 0 { cosine } else { sine };
-    signed(of_quadrant, (angle.quadrant + 1) >> 1, angle.is_told)
+/// [`libm::sin`].
+pub(crate) enum Sine {}
+
+/// [`libm::cos`].
+pub(crate) enum Cosine {}
+
+impl Circular for Sine {
+    #[inline(always)]
+    fn usual(x: f64) -> f64 {
+        let angle = Angle::of(x);
+        let (sine, cosine) = (sine_of_quarter(&angle), cosine_of_quarter(&angle));
+        let sine = if x.abs() < TINY { x } else { sine };
+        let of_quadrant = if angle.quadrant & 1 == 0 { sine } else { cosine };
+        signed(of_quadrant, angle.quadrant >> 1, angle.is_told)
+    }
+
+    fn whole(x: f64) -> f64 {
+        libm::sin(x)
+    }
+}
+
+impl Circular for Cosine {
+    #[inline(always)]
+    fn usual(x: f64) -> f64 {
+        let angle = Angle::of(x);
+        let (sine, cosine) = (sine_of_quarter(&angle), cosine_of_quarter(&angle));
+        let of_quadrant = if angle.quadrant & 1 == 0 { cosine } else { sine };
+        signed(of_quadrant, (angle.quadrant + 1) >> 1, angle.is_told)
+    }
+
+    fn whole(x: f64) -> f64 {
+        libm::cos(x)
+    }
 }
 
 /// `quadrant * pi/2 + x + y`, modulo whole turns in the bits of `quadrant` above two.
@@ -145,7 +170,8 @@ mod tests {
     fn check(arguments: impl IntoIterator<Item = f64>) -> usize {
         let mut n_told = 0;
         for x in arguments {
-            for (found, expected) in [(sine(x), libm::sin(x)), (cosine(x), libm::cos(x))] {
+            let (sine, cosine) = (Sine::usual(x), Cosine::usual(x));
+            for (found, expected) in [(sine, libm::sin(x)), (cosine, libm::cos(x))] {
                 if !found.is_nan() {
                     n_told += 1;
                     assert_eq!(
@@ -199,7 +225,7 @@ mod tests {
         }
         check([0.0, -0.0, f64::MIN_POSITIVE, 1e22]);
         for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert!(sine(x).is_nan() && cosine(x).is_nan());
+            assert!(Sine::usual(x).is_nan() && Cosine::usual(x).is_nan());
         }
     }
 }

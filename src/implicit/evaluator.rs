@@ -9,7 +9,7 @@
     reason = "the interpreter must be compiled inside the function that enables AVX2"
 )]
 
-use crate::circular;
+use crate::circular::{Circular, Cosine, Sine};
 use crate::instruction_set::InstructionSet;
 use crate::operation::{self, BinaryOp, UnaryOp};
 use crate::tape::{Instruction, Op, Tape};
@@ -146,8 +146,8 @@ fn unary<const N: usize>(row: &mut Row<'_, N>, op: UnaryOp) {
         UnaryOp::Sqrt => row.one(f64::sqrt),
         UnaryOp::HalfInverse => row.one(|a| operation::unless_zero(a, 0.5 / a)),
         UnaryOp::GuardedInverse => row.one(|a| operation::unless_zero(a, 1.0 / a)),
-        UnaryOp::Sin => row.mostly(circular::sine, libm::sin),
-        UnaryOp::Cos => row.mostly(circular::cosine, libm::cos),
+        UnaryOp::Sin => row.circular::<Sine>(),
+        UnaryOp::Cos => row.circular::<Cosine>(),
         UnaryOp::BlendGap => row.one(operation::blend_gap),
         UnaryOp::BlendSlope => row.one(operation::blend_slope),
         UnaryOp::BlendCurvature => row.one(operation::blend_curvature),
@@ -218,16 +218,17 @@ impl<const N: usize> Row<'_, N> {
         out[used..].fill(last);
     }
 
-    /// For functions with a form for most numbers that becomes vector code and gives NaN for the
-    /// others.
+    /// Lane by lane: a body as long as this is not unrolled, so that the loop becomes vector code.
     #[inline(always)]
-    fn mostly(&mut self, usual: impl Fn(f64) -> f64, whole: impl Fn(f64) -> f64) {
-        self.one(usual);
+    fn circular<F: Circular>(&mut self) {
         let used = self.used;
         let (out, [argument]) = self.registers::<1>();
+        for i in 0..N {
+            out[i] = F::usual(argument[i]);
+        }
         for i in 0..used {
             if out[i].is_nan() {
-                out[i] = whole(argument[i]);
+                out[i] = F::whole(argument[i]);
             }
         }
     }
