@@ -205,7 +205,7 @@ fn collapse_round(
             continue;
         }
         // The surroundings are as they were, but the link condition may look beyond them.
-        if surface.collapse_cost(gate, *h, merged).is_some_and(|after| after < ROOM) {
+        if surface.collapse_is_better(gate, *h, merged, ROOM) {
             for v in around {
                 touched[v as usize] = true;
             }
@@ -264,7 +264,7 @@ fn collapse_candidates(
     let mut candidates = Vec::new();
     for (&(h, _), merged) in quiet.iter().zip(&merged) {
         let Some(merged) = merged else { continue };
-        if surface.collapse_cost(gate, h, merged).is_some_and(|after| after < ROOM) {
+        if surface.collapse_is_better(gate, h, merged, ROOM) {
             candidates.push((h, *merged));
         }
     }

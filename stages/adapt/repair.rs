@@ -158,7 +158,7 @@ fn slide(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
     let feet: [_; 9] = surface.feet_within(std::array::from_fn(target), std::array::from_fn(reach));
     for (i, moved) in feet.into_iter().enumerate() {
         let (v, Some(moved)) = (corners[i / 3], moved) else { continue };
-        if surface.move_cost(gate, v, &moved) < GAIN * before[i / 3] {
+        if surface.move_is_better(gate, v, &moved, GAIN * before[i / 3]) {
             surface.place(v, moved);
             return Some(v);
         }
@@ -180,7 +180,7 @@ fn collapse(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32
             [surface.mesh.origin(h), surface.mesh.target(h)].map(|v| surface.fan_cost(gate, v));
         let limit = (GAIN * before[0].max(before[1])).min(SOFT);
         for merged in middle.into_iter().chain(ends) {
-            if surface.collapse_cost(gate, h, &merged).is_some_and(|after| after < limit) {
+            if surface.collapse_is_better(gate, h, &merged, limit) {
                 let kept = surface.mesh.origin(h);
                 surface.collapse(h, merged);
                 return Some(kept);

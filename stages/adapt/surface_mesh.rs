@@ -1,7 +1,7 @@
 //! A mesh under edit together with what the field says at its vertices.
 //!
 //! `*_cost` tells how bad the faces that an edit touches would be after it, on the scale of the
-//! [`Gate`]; the edit itself is a second call.
+//! [`Gate`], `*_is_better` whether they would be less bad than a limit; the edit is a second call.
 
 use crate::AdaptError;
 use crate::curve_error::Measure;
@@ -89,9 +89,15 @@ impl<'a> SurfaceMesh<'a> {
         faces.map(|f| gate.face_with_quality(&self.corners(f))).fold(0.0, f64::max)
     }
 
-    /// Worst of the faces about a vertex if it were `moved`.
-    pub(crate) fn move_cost(&self, gate: &Gate, vertex: u32, moved: &Vertex) -> f64 {
-        self.fan_cost_without(gate, vertex, moved, [u32::MAX; 2])
+    /// Whether all faces about a vertex would be better than `limit` if it were `moved`.
+    pub(crate) fn move_is_better(
+        &self,
+        gate: &Gate,
+        vertex: u32,
+        moved: &Vertex,
+        limit: f64,
+    ) -> bool {
+        self.fan_is_better(gate, (vertex, [u32::MAX; 2]), moved, limit)
     }
 
     pub(crate) fn place(&mut self, vertex: u32, moved: Vertex) {
@@ -111,31 +117,29 @@ impl<'a> SurfaceMesh<'a> {
         Some([worst(&[a, b, c], &[b, a, d]), worst(&[d, c, a], &[c, d, b])])
     }
 
-    /// Worst of the faces left about the ends of `h` if they became `merged`; `None` if they
-    /// cannot merge or a vertex would keep fewer than four edges.
-    pub(crate) fn collapse_cost(
+    /// Whether the ends of `h` can become `merged` and all faces left about them would be better
+    /// than `limit`. They cannot where a vertex would keep fewer than four edges.
+    pub(crate) fn collapse_is_better(
         &mut self,
         gate: &Gate,
         h: HalfEdge,
         merged: &Vertex,
-    ) -> Option<f64> {
+        limit: f64,
+    ) -> bool {
         if !self.mesh.can_collapse(h) {
-            return None;
+            return false;
         }
-        let o = self.mesh.opposite(h)?;
+        let (Some(o), Some(wings)) = (self.mesh.opposite(h), self.wings(h)) else { return false };
         let ends = [self.mesh.origin(h), self.mesh.target(h)];
-        let wings = self.wings(h)?;
         let merged_valence = self.mesh.valence(ends[0]) + self.mesh.valence(ends[1]) - 4;
         if !(4..=10).contains(&merged_valence) || wings.iter().any(|&v| self.mesh.valence(v) < 5) {
-            return None;
+            return false;
         }
         let removed = [h.face(), o.face()];
-        Some(ends.iter().fold(0.0, |worst, &v| {
-            f64::max(worst, self.fan_cost_without(gate, v, merged, removed))
-        }))
+        ends.iter().all(|&v| self.fan_is_better(gate, (v, removed), merged, limit))
     }
 
-    /// The caller has asked [`Self::collapse_cost`].
+    /// The caller has asked [`Self::collapse_is_better`].
     pub(crate) fn collapse(&mut self, h: HalfEdge, merged: Vertex) {
         let kept = self.mesh.origin(h);
         self.mesh.collapse(h);
@@ -150,12 +154,21 @@ impl<'a> SurfaceMesh<'a> {
         Some(vertex)
     }
 
-    fn fan_cost_without(&self, gate: &Gate, vertex: u32, moved: &Vertex, removed: [u32; 2]) -> f64 {
-        let kept = self.mesh.spokes(vertex).filter(|h| !removed.contains(&h.face()));
-        let cost = |h: HalfEdge| {
+    /// Whether the faces about a vertex, but for those that are `removed`, would all be better than
+    /// `limit` if it were `moved`. The first that is not ends it: most edits are tried in vain.
+    fn fan_is_better(
+        &self,
+        gate: &Gate,
+        (vertex, removed): (u32, [u32; 2]),
+        moved: &Vertex,
+        limit: f64,
+    ) -> bool {
+        let mut kept = self.mesh.spokes(vertex).filter(|h| !removed.contains(&h.face()));
+        let is_worse = |h: HalfEdge| {
             let (p, q) = (self.mesh.target(h), self.mesh.origin(h.prev()));
-            gate.face_with_quality(&[moved, self.at(p), self.at(q)])
+            gate.face_with_quality(&[moved, self.at(p), self.at(q)]) >= limit
         };
-        kept.map(cost).fold(0.0, f64::max)
+        // No face is better than 0.
+        limit > 0.0 && !kept.any(is_worse)
     }
 }
