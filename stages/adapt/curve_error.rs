@@ -23,7 +23,7 @@ const UNSOUND: f64 = 0.1;
 /// Edges judged together: 320 points fill the evaluator's blocks and stay in the nearest cache.
 const BATCH: usize = 64;
 /// Batches a task: fewer cost more to hand out than a second thread gains.
-const BATCHES_A_TASK: usize = 4;
+const BATCHES_A_TASK: usize = 2;
 
 /// Eight iterations rank edges as thirty do.
 const NORMAL: NormalOptions = NormalOptions { samples: 10, iterations: 8 };

@@ -20,15 +20,22 @@ pub(crate) struct ErrorCache {
 impl ErrorCache {
     /// Each edge with the error of its own curve.
     pub(crate) fn edges(&mut self, surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
-        self.own.update(surface, |h| {
-            ([surface.mesh.origin(h), surface.mesh.target(h)], surface.wings(h))
-        })
+        self.own.update(
+            surface,
+            |_| true,
+            |h| ([surface.mesh.origin(h), surface.mesh.target(h)], surface.wings(h)),
+        )
     }
 
     /// Each edge with the error of the curve between the vertices opposite to it, at a border its
-    /// own: the same edges in the same order as [`Self::edges`].
-    pub(crate) fn diagonals(&mut self, surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
-        self.diagonal.update(surface, |h| {
+    /// own: the same edges in the same order as [`Self::edges`]. Infinite for those that are not
+    /// `wanted`, unless known.
+    pub(crate) fn diagonals(
+        &mut self,
+        surface: &SurfaceMesh<'_>,
+        wanted: impl Fn(HalfEdge) -> bool,
+    ) -> Vec<EdgeError> {
+        self.diagonal.update(surface, wanted, |h| {
             let own = [surface.mesh.origin(h), surface.mesh.target(h)];
             match surface.wings(h) {
                 // Seen from the left wing, the target of h lies to the left.
@@ -54,6 +61,7 @@ impl Rows {
     fn update(
         &mut self,
         surface: &SurfaceMesh<'_>,
+        wanted: impl Fn(HalfEdge) -> bool,
         pair: impl Fn(HalfEdge) -> Pair,
     ) -> Vec<EdgeError> {
         let rows = 3 * surface.mesh.face_rows();
@@ -72,6 +80,10 @@ impl Rows {
                 key = [a, b, c, d, key[4] + moves(c) + moves(d)];
             }
             if self.keys[h.row()] != key {
+                if !wanted(h) {
+                    edges.push((h, f64::INFINITY));
+                    continue;
+                }
                 self.keys[h.row()] = key;
                 stale.push(edges.len());
                 let wings = wings.map(|wings| wings.map(|v| surface.at(v)));

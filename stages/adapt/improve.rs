@@ -48,7 +48,8 @@ pub(crate) fn improve(
     };
     for round in 0..n_rounds {
         ctx.host.progress(u64::from(round), u64::from(n_rounds))?;
-        let flipped = flip_round(surface, &gate, &errors, &cache.diagonals(surface));
+        let others = cache.diagonals(surface, |h| may_flip(surface, h));
+        let flipped = flip_round(surface, &gate, &errors, &others);
         if flipped > 0 {
             errors = cache.edges(surface);
         }
@@ -170,6 +171,12 @@ fn flip_round(
 }
 
 fn flip_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge) -> bool {
+    may_flip(surface, h)
+        && surface.flip_cost(gate, h).is_some_and(|[before, after]| after <= before.max(ROOM))
+}
+
+/// Whether valences and the shapes of the faces allow the flip.
+fn may_flip(surface: &SurfaceMesh<'_>, h: HalfEdge) -> bool {
     let Some(wings) = surface.wings(h) else { return false };
     let [c, d] = wings.map(|v| surface.at(v));
     let [a, b] = surface.ends(h);
@@ -179,7 +186,6 @@ fn flip_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge) -> bool {
     quality_of([[d, c, a], [c, d, b]]) >= before.min(0.2)
         && ends.iter().all(|&v| surface.mesh.valence(v) > 4)
         && wings.iter().all(|&v| surface.mesh.valence(v) < 10)
-        && surface.flip_cost(gate, h).is_some_and(|[before, after]| after <= before.max(ROOM))
 }
 
 /// Merges up to `n_wanted` edges whose new curves stay below `limit`; best first.
@@ -190,7 +196,7 @@ fn collapse_round(
     (limit, n_wanted): (f64, usize),
 ) -> u64 {
     let candidates = collapse_candidates(surface, gate, errors, (limit, n_wanted));
-    let mut order: Vec<(f64, usize)> = merged_errors(surface, &candidates);
+    let mut order: Vec<(f64, usize)> = merged_errors(surface, &candidates, limit);
     order.retain(|&(e, _)| e < limit || limit == f64::INFINITY);
     order.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
     let mut touched = vec![false; surface.mesh.vertex_rows()];
@@ -217,25 +223,56 @@ fn collapse_round(
     n_collapsed
 }
 
-/// For each candidate the largest error of the curves that merging gives, and its place.
+/// For each candidate the largest error of the curves that merging gives, and its place; of those
+/// that reach `limit` one such error.
 fn merged_errors(
     surface: &SurfaceMesh<'_>,
     candidates: &[(HalfEdge, Vertex)],
+    limit: f64,
 ) -> Vec<(f64, usize)> {
     let tasks: Vec<_> = candidates.chunks(CANDIDATES_A_TASK).collect();
     let errors = map(surface.host, tasks.len(), |task| {
-        let mut first = vec![0];
-        let mut spokes: Vec<JudgedEdge<'_>> = Vec::new();
-        for (h, merged) in tasks[task] {
-            let spoke = |v: u32| JudgedEdge { ends: [merged, surface.at(v)], wings: None };
-            spokes.extend(ring(surface, *h).map(spoke));
-            first.push(spokes.len());
-        }
-        let errors = surface.measure.errors(surface.field, &Serial, &spokes);
-        let own = first.windows(2).map(|w| &errors[w[0]..w[1]]);
-        own.map(|own| own.iter().copied().fold(0.0, f64::max)).collect::<Vec<f64>>()
+        let fans = tasks[task].iter().map(|candidate| fan(surface, candidate)).collect();
+        merged_errors_of(surface, fans, limit)
     });
     errors.concat().into_iter().zip(0..).collect()
+}
+
+fn merged_errors_of(
+    surface: &SurfaceMesh<'_>,
+    mut fans: Vec<Vec<JudgedEdge<'_>>>,
+    limit: f64,
+) -> Vec<f64> {
+    let judge = |edges: &[JudgedEdge<'_>]| surface.measure.errors(surface.field, &Serial, edges);
+    // The longest spoke tells of most candidates that they will not do.
+    let longest: Vec<JudgedEdge<'_>> = fans.iter_mut().map(take_longest).collect();
+    let mut errors = judge(&longest);
+    let (mut owners, mut rest) = (Vec::new(), Vec::new());
+    for (k, fan) in fans.into_iter().enumerate() {
+        if errors[k] < limit || limit == f64::INFINITY {
+            rest.extend(fan);
+            owners.resize(rest.len(), k);
+        }
+    }
+    for (k, error) in owners.into_iter().zip(judge(&rest)) {
+        errors[k] = errors[k].max(error);
+    }
+    errors
+}
+
+/// The edges about a merged vertex.
+fn fan<'s>(
+    surface: &'s SurfaceMesh<'_>,
+    (h, merged): &'s (HalfEdge, Vertex),
+) -> Vec<JudgedEdge<'s>> {
+    let spoke = |v: u32| JudgedEdge { ends: [merged, surface.at(v)], wings: None };
+    ring(surface, *h).map(spoke).collect()
+}
+
+fn take_longest<'s>(fan: &mut Vec<JudgedEdge<'s>>) -> JudgedEdge<'s> {
+    let length_sq = |e: &JudgedEdge<'_>| (e.ends[1].position - e.ends[0].position).norm_squared();
+    let longest = (0..fan.len()).max_by(|&i, &j| length_sq(&fan[i]).total_cmp(&length_sq(&fan[j])));
+    fan.swap_remove(longest.expect("invariant: an edge has vertices about it"))
 }
 
 /// Edges in the quietest places whose merging the gate bears, with the merged vertex.
