@@ -1,12 +1,15 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench bench-peers library-bench cluster reliability fuzz-check golden pictures docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench bench-peers library-bench cluster reliability fuzz fuzz-check golden pictures docs clean
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ISOSPLINE := $(TARGET)/release/isospline
 # The models of [TK] Fig. 9-15, in its order.
 PAPER := torus_regular torus dodecahedron double_torus mcmullen chair deccube
+# What reads bytes from outside.
+FUZZ_TARGETS := formula config obj jsurf vm npz journal artifact
+FUZZ_SECONDS ?= 120
 # One view for pictures that stand side by side.
 DRAW_CUBE = $(ISOSPLINE) render out/deccube --size 620x560 --view 58,27
 DRAW_STRIPES = $(ISOSPLINE) render out/pictures/dodecahedron --size 560x520 --view -50,40 --stripes 18
@@ -66,6 +69,15 @@ bench-peers: build ## the decorative cube to 1e-3 .. 1e-8, beside marching cubes
 
 reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
 	$(CARGO) run --release -q -p isospline-tests --bin scoreboard
+
+fuzz: ## run each target of cargo-fuzz for FUZZ_SECONDS (needs cargo-fuzz and a C++ compiler)
+	@for target in $(FUZZ_TARGETS); do \
+		seeds=; test ! -d tests/fixtures/fuzz/$$target || seeds=tests/fixtures/fuzz/$$target; \
+		mkdir -p fuzz/corpus/$$target; \
+		$(CARGO) fuzz run --sanitizer none --target-dir $(TARGET)/fuzz $$target \
+			fuzz/corpus/$$target $$seeds -- -max_total_time=$(FUZZ_SECONDS) -timeout=10 \
+			-rss_limit_mb=1024 || exit $$?; \
+	done
 
 fuzz-check: ## check that the targets of cargo-fuzz compile (needs a C++ compiler)
 	$(CARGO) check --manifest-path fuzz/Cargo.toml --target-dir $(TARGET)/fuzz
