@@ -142,8 +142,15 @@ impl Affine {
 
     fn unary(&self, op: UnaryOp) -> Self {
         use UnaryOp as U;
-        if matches!(op, U::Sin | U::Cos) {
-            return self.circular(op);
+        let direct = match op {
+            U::Sin | U::Cos => Some(self.circular(op)),
+            U::Sqrt => self.root(),
+            U::HalfInverse => self.quotient(0.5),
+            U::GuardedInverse => self.quotient(1.0),
+            _ => None,
+        };
+        if let Some(direct) = direct {
+            return direct;
         }
         let x = self.interval();
         let plain = x.unary(op);
@@ -153,7 +160,6 @@ impl Affine {
             U::Abs if x.lo >= 0.0 => return *self,
             U::Abs if x.hi <= 0.0 => return self.negated(),
             U::Abs => x.unary(U::Sign),
-            U::Sqrt if x.lo > 0.0 => Interval::point(0.5) / plain,
             U::Exp => plain,
             U::Ln if x.lo > 0.0 => one / x,
             U::Atan => one / (one + x.power(2)),
@@ -175,17 +181,55 @@ impl Affine {
         let (value, slope) = if op == UnaryOp::Sin { (sin, cos) } else { (cos, -sin) };
         let reach = self.reach();
         let most = (value.abs() + reach).min(1.0);
-        // libm is within a few units of 2^-53 of the truth.
-        let rounding = MUL_ROUNDING * (1.0 + reach);
-        let rest = 0.5 * reach * reach * most + slope.abs() * self.rest + rounding;
-        if rest >= 1.0 {
-            return Self::any_of(Interval::new(-1.0, 1.0));
+        // libm is within a few units of 2^-53 of the truth: twice the rounding of a product.
+        let form = self.along(value, slope, 0.5 * reach * reach * most + 2.0 * MUL_ROUNDING);
+        if form.rest >= 1.0 { Self::any_of(Interval::new(-1.0, 1.0)) } else { form }
+    }
+
+    /// `sqrt(a)` by its tangent in the middle: the square of the distance from there over
+    /// `2 sqrt(m)^3` is more than it bends. `None` near zero.
+    fn root(&self) -> Option<Self> {
+        let reach = self.reach() * REST_ROUNDING;
+        // Also false for NaN.
+        if !(self.middle > reach && reach.is_finite()) {
+            return None;
         }
-        let rest = rest * REST_ROUNDING + TINY;
-        Self { middle: value, slopes: self.slopes.map(|s| slope * s), rest }
+        let value = self.middle.sqrt();
+        let slope = 0.5 / value;
+        let bend = reach * reach * slope / self.middle;
+        Some(self.along(value, slope, bend))
+    }
+
+    /// `k / a` by its tangent in the middle: `1/a = 1/m - d/m^2 + d^2/(m^2 a)`. `None` where plain
+    /// enclosures are better, near zero.
+    fn quotient(&self, k: f64) -> Option<Self> {
+        const NEAR: f64 = 0.6;
+        let reach = self.reach() * REST_ROUNDING;
+        let size = self.middle.abs();
+        // Also false for NaN.
+        if !(reach < NEAR * size && size.is_finite()) {
+            return None;
+        }
+        let value = k / self.middle;
+        let slope = -value / self.middle;
+        let bend = reach * reach * slope.abs() / (size - reach);
+        Some(self.along(value, slope, bend))
+    }
+
+    /// The tangent in the middle, and how far the function bends away from it.
+    fn along(&self, value: f64, slope: f64, bend: f64) -> Self {
+        let rounding = MUL_ROUNDING * (value.abs() + slope.abs() * self.reach());
+        let rest = bend + slope.abs() * self.rest + rounding;
+        let slopes = self.slopes.map(|s| slope * s);
+        Self { middle: value, slopes, rest: rest * REST_ROUNDING * REST_ROUNDING + TINY }
     }
 
     fn power(&self, n: i32) -> Self {
+        if n == -1
+            && let Some(quotient) = self.quotient(1.0)
+        {
+            return quotient;
+        }
         let x = self.interval();
         let slope = Interval::point(f64::from(n)) * x.power(n - 1);
         self.linearised(Interval::point(self.middle).power(n), slope, x.power(n))
