@@ -2,6 +2,7 @@
 
 use crate::AdaptParams;
 use crate::vertex::Vertex;
+use isospline_geometry::Vec3;
 
 /// Cosine below which a face counts as folded against the normal of a corner. Positive means that
 /// all sector angles, seen along the normal, lie in (0, 180) degrees; the rest is margin.
@@ -30,24 +31,65 @@ impl Gate {
     /// Worst of turning and slope of the edge between two vertices.
     pub(crate) fn edge(&self, p: &Vertex, q: &Vertex) -> f64 {
         let chord = q.position - p.position;
-        let turning = (1.0 - p.normal.dot(&q.normal)) / (1.0 - self.cos_turning);
-        turning.max(slope(p, q) / self.max_slope).max(if chord.norm() > 0.0 { 0.0 } else { 2.0 })
+        self.edge_along(&chord, chord.norm_squared(), [p, q])
     }
 
     /// Worst of the edges of a face and of its fold; at most 1 if the face is fit.
     pub(crate) fn face(&self, corners: &[&Vertex; 3]) -> f64 {
-        let [a, b, c] = corners;
-        let edges = self.edge(a, b).max(self.edge(b, c)).max(self.edge(c, a));
-        let cos_tilt = cos_tilt(corners);
-        // Worse than any edge: no edit may fold a face to save an edge, or repairs run away.
-        edges.max(if cos_tilt < COS_FOLD { FOLDED * (1.0 - cos_tilt) } else { 0.0 })
+        self.face_of(corners, &Sides::of(corners))
     }
 
     /// [`Self::face`], raised towards 1, never beyond, for slivers: quality alone does not make a
     /// face unfit, but of two fit meshes the one without slivers is better.
     pub(crate) fn face_with_quality(&self, corners: &[&Vertex; 3]) -> f64 {
-        let sliver = 0.9 * self.min_quality / quality(corners);
-        self.face(corners).max(if sliver > 0.9 { sliver.min(0.99) } else { 0.0 })
+        let sides = Sides::of(corners);
+        let sliver = 0.9 * self.min_quality / sides.quality();
+        self.face_of(corners, &sides).max(if sliver > 0.9 { sliver.min(0.99) } else { 0.0 })
+    }
+
+    fn face_of(&self, corners: &[&Vertex; 3], sides: &Sides) -> f64 {
+        let [a, b, c] = *corners;
+        let ends = [[a, b], [b, c], [c, a]];
+        let edge = |k: usize| self.edge_along(&sides.chords[k], sides.lengths_sq[k], ends[k]);
+        let edges = edge(0).max(edge(1)).max(edge(2));
+        let cos_tilt = sides.cos_tilt(corners);
+        // Worse than any edge: no edit may fold a face to save an edge, or repairs run away.
+        edges.max(if cos_tilt < COS_FOLD { FOLDED * (1.0 - cos_tilt) } else { 0.0 })
+    }
+
+    fn edge_along(&self, chord: &Vec3, length_sq: f64, [p, q]: [&Vertex; 2]) -> f64 {
+        let length = length_sq.sqrt();
+        let turning = (1.0 - p.normal.dot(&q.normal)) / (1.0 - self.cos_turning);
+        let slope = chord.dot(&p.normal).abs().max(chord.dot(&q.normal).abs()) / length;
+        turning.max(slope / self.max_slope).max(if length > 0.0 { 0.0 } else { 2.0 })
+    }
+}
+
+/// The sides of a face, each from its corner to the next, and twice its vector area.
+struct Sides {
+    chords: [Vec3; 3],
+    lengths_sq: [f64; 3],
+    area: Vec3,
+}
+
+impl Sides {
+    fn of(corners: &[&Vertex; 3]) -> Self {
+        let [a, b, c] = corners.map(|v| v.position);
+        let chords = [b - a, c - b, a - c];
+        let lengths_sq = chords.map(|chord| chord.norm_squared());
+        Self { chords, lengths_sq, area: chords[0].cross(&(c - a)) }
+    }
+
+    /// `4 sqrt(3) area / (sum of squared sides)`: 1 if equilateral, 0 if flat.
+    fn quality(&self) -> f64 {
+        let [x, y, z] = self.lengths_sq;
+        2.0 * 3f64.sqrt() * self.area.norm() / (x + y + z)
+    }
+
+    /// Cosine of the largest angle between the face and the normal of a corner; -1 without area.
+    fn cos_tilt(&self, corners: &[&Vertex; 3]) -> f64 {
+        let Some(normal) = self.area.try_normalize(0.0) else { return -1.0 };
+        corners.iter().map(|v| v.normal.dot(&normal)).fold(1.0, f64::min)
     }
 }
 
@@ -65,16 +107,7 @@ pub(crate) fn slope(p: &Vertex, q: &Vertex) -> f64 {
 
 /// `4 sqrt(3) area / (sum of squared sides)`: 1 if equilateral, 0 if flat.
 pub(crate) fn quality(corners: &[&Vertex; 3]) -> f64 {
-    let [a, b, c] = corners.map(|v| v.position);
-    let sides_sq = (b - a).norm_squared() + (c - b).norm_squared() + (a - c).norm_squared();
-    2.0 * 3f64.sqrt() * (b - a).cross(&(c - a)).norm() / sides_sq
-}
-
-/// Cosine of the largest angle between the face and the normal of a corner; -1 without area.
-fn cos_tilt(corners: &[&Vertex; 3]) -> f64 {
-    let [a, b, c] = corners.map(|v| v.position);
-    let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) else { return -1.0 };
-    corners.iter().map(|v| v.normal.dot(&normal)).fold(1.0, f64::min)
+    Sides::of(corners).quality()
 }
 
 #[cfg(test)]
