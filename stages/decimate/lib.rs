@@ -13,6 +13,7 @@ mod quadric;
 mod queue;
 mod simplify;
 mod surface;
+mod tiles;
 
 pub use error::DecimateError;
 pub use params::DecimateParams;
@@ -28,7 +29,7 @@ pub struct Decimate {
 
 impl Stage for Decimate {
     const NAME: &'static str = "decimate";
-    const VERSION: u32 = 2;
+    const VERSION: u32 = 3;
     type Params = DecimateParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();

@@ -4,6 +4,7 @@ use crate::guards::{Guards, LEVELS, Merge};
 use crate::quadric::Quadric;
 use crate::queue::EdgeQueue;
 use crate::surface::SurfaceData;
+use crate::tiles;
 use crate::{DecimateError, DecimateParams};
 use isospline_geometry::{EditMesh, HalfEdge, TriangleMesh, Vec3};
 use isospline_stage::{Counters, Ctx};
@@ -23,17 +24,21 @@ pub(crate) fn simplify(
     if let Some(v) = mesh.positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
         return Err(DecimateError::NotFinite { vertex: v as u32 });
     }
-    let surface = SurfaceData::of(ctx.field, &mesh);
+    let surface = SurfaceData::of(ctx.field, ctx.host, &mesh);
     // Quadrics hold squared coordinates: about the centre they lose no digits to an offset.
     let center = mesh.bounds().center();
     for p in &mut mesh.positions {
         *p -= center;
     }
-    let quadrics = vertex_quadrics(&mesh, &surface.curvatures, params);
-    let weights = vertex_areas(&mesh);
-    let mesh = EditMesh::new(mesh)?;
-    let queue = EdgeQueue::new(3 * mesh.face_rows());
-    let mut run = Run { mesh, quadrics, weights, normals: surface.normals, queue };
+    let mut vertices = Vertices {
+        quadrics: vertex_quadrics(&mesh, &surface.curvatures, params),
+        weights: vertex_areas(&mesh),
+        normals: surface.normals,
+    };
+    if tiles::are_worth_it(&mesh, params) {
+        (mesh, vertices) = tiles::coarsen(ctx, params, mesh, vertices, counters)?;
+    }
+    let mut run = Run::new(EditMesh::new(mesh)?, vertices);
     run.reach(ctx, params, counters)?;
     let mut coarse = run.mesh.compact();
     for p in &mut coarse.positions {
@@ -42,18 +47,56 @@ pub(crate) fn simplify(
     Ok(coarse)
 }
 
+/// What is known of the vertices of a mesh.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Vertices {
+    pub(crate) quadrics: Vec<Quadric>,
+    /// Area that each vertex stands for: weighs normals when vertices merge.
+    pub(crate) weights: Vec<f64>,
+    pub(crate) normals: Vec<Vec3>,
+}
+
 /// A mesh on its way down.
 #[derive(Debug)]
-struct Run {
-    mesh: EditMesh,
-    quadrics: Vec<Quadric>,
-    /// Area that each vertex stands for: weighs normals when vertices merge.
-    weights: Vec<f64>,
-    normals: Vec<Vec3>,
+pub(crate) struct Run {
+    pub(crate) mesh: EditMesh,
+    pub(crate) vertices: Vertices,
+    /// Vertices that stay as they are; none if empty.
+    pub(crate) locked: Vec<bool>,
     queue: EdgeQueue,
 }
 
+impl Vertices {
+    /// Those of some rows, in their order.
+    pub(crate) fn of_rows(&self, rows: &[u32]) -> Self {
+        let rows = || rows.iter().map(|&v| v as usize);
+        Self {
+            quadrics: rows().map(|v| self.quadrics[v]).collect(),
+            weights: rows().map(|v| self.weights[v]).collect(),
+            normals: rows().map(|v| self.normals[v]).collect(),
+        }
+    }
+}
+
 impl Run {
+    pub(crate) fn new(mesh: EditMesh, vertices: Vertices) -> Self {
+        let queue = EdgeQueue::new(3 * mesh.face_rows());
+        Self { mesh, vertices, locked: Vec::new(), queue }
+    }
+
+    /// Collapses what the guards allow until at most `wanted` faces are left or nothing can go.
+    pub(crate) fn reach_or_stop(&mut self, params: &DecimateParams, wanted: usize) {
+        let guards = Guards::at_level(params, 0);
+        self.set_all_costs();
+        while self.mesh.face_count() > wanted {
+            let before = self.mesh.face_count();
+            self.refill_and_pass(&guards, wanted);
+            if self.mesh.face_count() == before {
+                return;
+            }
+        }
+    }
+
     fn reach(
         &mut self,
         ctx: &Ctx<'_>,
@@ -67,9 +110,7 @@ impl Run {
         while self.mesh.face_count() > wanted {
             let before = self.mesh.face_count();
             ctx.host.progress((wanted + total - before) as u64, total as u64)?;
-            self.queue.refill(&self.mesh);
-            let until = wanted.max(libm::ceil(REFILL * before as f64) as usize);
-            self.pass(&Guards::at_level(params, level), until);
+            self.refill_and_pass(&Guards::at_level(params, level), wanted);
             let collapses = (before - self.mesh.face_count()) as u64 / 2;
             match level {
                 0 => counters.count("collapses", collapses),
@@ -85,15 +126,17 @@ impl Run {
     }
 
     fn set_all_costs(&mut self) {
-        let Self { mesh, quadrics, queue, .. } = self;
+        let Self { mesh, vertices, queue, .. } = self;
         for h in mesh.edges() {
             if let Some(o) = mesh.opposite(h) {
-                queue.set(h, o, best_merge(mesh, quadrics, h).1);
+                queue.set(h, o, best_merge(mesh, &vertices.quadrics, h).1);
             }
         }
     }
 
-    fn pass(&mut self, guards: &Guards, until: usize) {
+    fn refill_and_pass(&mut self, guards: &Guards, wanted: usize) {
+        self.queue.refill(&self.mesh);
+        let until = wanted.max(libm::ceil(REFILL * self.mesh.face_count() as f64) as usize);
         while self.mesh.face_count() > until {
             let Some(h) = self.queue.pop(&self.mesh) else { return };
             self.collapse(h, guards);
@@ -102,18 +145,23 @@ impl Run {
 
     fn collapse(&mut self, h: HalfEdge, guards: &Guards) {
         let (a, b) = (self.mesh.origin(h) as usize, self.mesh.target(h) as usize);
-        let (position, _) = best_merge(&self.mesh, &self.quadrics, h);
-        let sum = self.weights[a] * self.normals[a] + self.weights[b] * self.normals[b];
-        let merge = Merge { edge: h, position, normal: sum.try_normalize(0.0).unwrap_or(sum) };
-        if !guards.allow(&self.mesh, &self.normals, &merge) || !self.mesh.can_collapse(h) {
+        let Self { mesh, vertices, locked, queue } = self;
+        let is_locked = |v: usize| locked.get(v).copied().unwrap_or(false);
+        if is_locked(a) || is_locked(b) {
             return;
         }
-        self.mesh.collapse(h);
-        self.mesh.positions[a] = position;
-        self.normals[a] = merge.normal;
-        self.weights[a] += self.weights[b];
-        self.quadrics[a] = self.quadrics[a].plus(&self.quadrics[b]);
-        let Self { mesh, quadrics, queue, .. } = self;
+        let Vertices { quadrics, weights, normals } = vertices;
+        let (position, _) = best_merge(mesh, quadrics, h);
+        let sum = weights[a] * normals[a] + weights[b] * normals[b];
+        let merge = Merge { edge: h, position, normal: sum.try_normalize(0.0).unwrap_or(sum) };
+        if !guards.allow(mesh, normals, &merge) || !mesh.can_collapse(h) {
+            return;
+        }
+        mesh.collapse(h);
+        mesh.positions[a] = position;
+        normals[a] = merge.normal;
+        weights[a] += weights[b];
+        quadrics[a] = quadrics[a].plus(&quadrics[b]);
         for s in mesh.spokes(a as u32) {
             if let Some(o) = mesh.opposite(s) {
                 queue.push(s, o, best_merge(mesh, quadrics, s).1);

@@ -3,6 +3,7 @@
 use isospline_geometry::{Mat3, TriangleMesh, Vec3};
 use isospline_implicit::field::full;
 use isospline_implicit::{Field, Jet2};
+use isospline_stage::{Host, map};
 
 /// Points evaluated at once.
 const BLOCK: usize = 1024;
@@ -17,19 +18,20 @@ pub(crate) struct SurfaceData {
 }
 
 impl SurfaceData {
-    /// Evaluates `field` at all vertices of `mesh`.
-    pub(crate) fn of(field: &dyn Field, mesh: &TriangleMesh) -> Self {
+    /// Evaluates `field` at all vertices of `mesh`, on the host's threads.
+    pub(crate) fn of(field: &dyn Field, host: &dyn Host, mesh: &TriangleMesh) -> Self {
         let n = mesh.positions.len();
         let mut data = Self { normals: Vec::with_capacity(n), curvatures: Vec::with_capacity(n) };
         let empty = Jet2 { value: 0.0, gradient: Vec3::zeros(), hessian: [0.0; 6] };
-        let mut jets = vec![empty; BLOCK.min(n)];
-        for points in mesh.positions.chunks(BLOCK) {
-            field.hessians(points, &mut jets[..points.len()]);
-            for jet in &jets[..points.len()] {
-                let (normal, curvature) = normal_and_curvature(jet);
-                data.normals.push(normal);
-                data.curvatures.push(curvature);
-            }
+        let blocks: Vec<&[Vec3]> = mesh.positions.chunks(BLOCK).collect();
+        let found = map(host, blocks.len(), |k| {
+            let mut jets = vec![empty; blocks[k].len()];
+            field.hessians(blocks[k], &mut jets);
+            jets.iter().map(normal_and_curvature).collect::<Vec<_>>()
+        });
+        for (normal, curvature) in found.into_iter().flatten() {
+            data.normals.push(normal);
+            data.curvatures.push(curvature);
         }
         if data.normals.iter().any(|n| n.x.is_nan()) {
             data.fill_from_faces(mesh);
@@ -71,6 +73,7 @@ fn normal_and_curvature(jet: &Jet2) -> (Vec3, f64) {
 mod tests {
     use super::*;
     use isospline_implicit::ClosureField;
+    use isospline_stage::Serial;
 
     #[test]
     fn a_sphere_of_radius_two_bends_by_a_half_in_both_directions() {
@@ -79,7 +82,7 @@ mod tests {
             .with_hessian(|_| [2.0, 0.0, 0.0, 2.0, 0.0, 2.0]);
         let positions = vec![Vec3::new(2.0, 0.0, 0.0), Vec3::new(0.0, 1.2, -1.6)];
         let mesh = TriangleMesh { positions, faces: Vec::new() };
-        let data = SurfaceData::of(&field, &mesh);
+        let data = SurfaceData::of(&field, &Serial, &mesh);
         for (p, (n, k)) in mesh.positions.iter().zip(data.normals.iter().zip(&data.curvatures)) {
             assert!((n - p / 2.0).norm() < 1e-15);
             assert!((k - 0.5f64.sqrt()).abs() < 1e-14);
@@ -92,7 +95,7 @@ mod tests {
             ClosureField::new(1.0, |p: Vec3| p.z * p.z).with_gradient(|p| 2.0 * p.z * Vec3::z());
         let positions = vec![Vec3::zeros(), Vec3::x(), Vec3::y()];
         let mesh = TriangleMesh { positions, faces: vec![[0, 1, 2]] };
-        let data = SurfaceData::of(&field, &mesh);
+        let data = SurfaceData::of(&field, &Serial, &mesh);
         assert_eq!(data.normals, [Vec3::z(); 3]);
         assert_eq!(data.curvatures, [0.0; 3]);
     }

@@ -109,6 +109,20 @@ fn a_torus_keeps_its_genus_and_gets_the_faces_wanted() {
 }
 
 #[test]
+fn a_large_mesh_goes_through_tiles_and_comes_out_as_good() {
+    let (field, fine) = (torus_field(), torus_mesh(340, 170, Vec3::zeros()));
+    let piece = decimate(&field, &fine, 1000).unwrap();
+    assert!(piece.counters.counts["collapses_in_tiles"] > 40_000, "{:?}", piece.counters);
+    let topology = piece.rows.topology[0];
+    assert_eq!((topology.components, topology.euler_characteristic), (1, 0));
+    assert_eq!(piece.rows.face.len(), 1000);
+    let (turning, quality, distance) = figures(&field, &piece.rows.view().to_triangles());
+    assert!(turning <= 60.0 && quality >= 0.1, "{turning} {quality}");
+    // As of the meshes above.
+    assert!(distance <= 3.0 * 182.0 / 8.0 / 1000.0, "{distance}");
+}
+
+#[test]
 fn components_are_kept_apart() {
     let (fine, field) = two_tori();
     let piece = decimate(&field, &fine, 800).unwrap();
