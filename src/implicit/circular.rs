@@ -190,7 +190,7 @@ mod tests {
         let at = move |k: u32| {
             let part = (f64::from(k) * 0.618_033_988_749_894_9).fract();
             let size = least * libm::pow(most / least, part);
-            if k % 2 == 0 { size } else { -size }
+            if k.is_multiple_of(2) { size } else { -size }
         };
         (0..n).map(at)
     }

@@ -93,36 +93,6 @@ impl Dag {
         needed
     }
 
-    /// Whether all operations under `roots` have slopes that are continuous wherever they are
-    /// bounded: then the mean value theorem holds for the slopes as well.
-    pub(crate) fn has_continuous_slopes(&self, roots: &[NodeId]) -> bool {
-        use BinaryOp::{Add, Div, Mul, Sub};
-        use UnaryOp as U;
-        let needed = self.reachable(roots);
-        let is_smooth = |node: &Node| match node {
-            Node::Constant(_) | Node::Variable(_) | Node::Power(..) => true,
-            Node::Unary(op, _) => matches!(
-                op,
-                U::Neg
-                    | U::Sqrt
-                    | U::Exp
-                    | U::Ln
-                    | U::Log10
-                    | U::Sin
-                    | U::Cos
-                    | U::Atan
-                    | U::Sinh
-                    | U::Cosh
-                    | U::Tanh
-            ),
-            Node::Binary(op, ..) => matches!(op, Add | Sub | Mul | Div),
-            // With a variable width it is built from the absolute value.
-            Node::Blend([_, _, k]) => self.value_of(*k).is_some(),
-            Node::Select(_) => false,
-        };
-        self.nodes.iter().zip(needed).filter(|(_, needed)| *needed).all(|(node, _)| is_smooth(node))
-    }
-
     /// The node itself, found or appended, without simplification.
     pub(crate) fn intern(&mut self, node: Node) -> NodeId {
         self.ids.place(&mut self.nodes, node)

@@ -12,9 +12,6 @@ pub fn full(s: &SymMat3) -> Mat3 {
     Mat3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5])
 }
 
-/// Enclosures of second derivatives over a box, in the places of a [`SymMat3`].
-pub type HessianIntervals = [Interval; 6];
-
 /// Value and gradient at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jet1 {
@@ -69,14 +66,6 @@ pub trait Field: Send + Sync {
         for (out, &domain) in out.iter_mut().zip(domains) {
             *out = self.gradient_enclosure(domain);
         }
-    }
-
-    /// Enclosures of the second derivatives over many boxes: for x and c in a box, `grad f(x)` lies
-    /// in `grad f(c) + hessian (x - c)`. `None` where that is not known: for fields without
-    /// intervals, with kinks, or too long to be worth it; for all boxes then.
-    fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
-        assert_eq!(domains.len(), out.len(), "one result a box");
-        out.fill(None);
     }
 
     /// Affine forms of value and gradient over many boxes, as [`Affine::middle_and_half`] counts
@@ -214,13 +203,6 @@ impl<F: Field> Field for Oriented<F> {
             }
         }
     }
-
-    fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
-        self.inner.hessian_enclosures(domains, out);
-        for hessian in out.iter_mut().flatten() {
-            *hessian = hessian.map(|h| self.turn(h));
-        }
-    }
 }
 
 impl<F> Oriented<F> {
@@ -264,13 +246,6 @@ macro_rules! forward_field {
                 out: &mut [Option<IntervalJet>],
             ) {
                 (**self).gradient_enclosures(domains, out);
-            }
-            fn hessian_enclosures(
-                &self,
-                domains: &[[Interval; 3]],
-                out: &mut [Option<HessianIntervals>],
-            ) {
-                (**self).hessian_enclosures(domains, out);
             }
             fn gradient_forms(&self, domains: &[[Interval; 3]], out: &mut [Option<AffineJet>]) {
                 (**self).gradient_forms(domains, out);

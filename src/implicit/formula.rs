@@ -35,7 +35,7 @@ use crate::interval_lanes::enclose_all;
 use crate::kinks;
 use crate::lowering::{self, Target};
 use crate::tape::Tape;
-use crate::{AffineJet, Field, HessianIntervals, Interval, IntervalJet, Jet1, Jet2};
+use crate::{AffineJet, Field, Interval, IntervalJet, Jet1, Jet2};
 use crate::{canonical, derivative, parser};
 use isospline_geometry::Vec3;
 use std::collections::BTreeMap;
@@ -65,13 +65,7 @@ pub struct Formula {
     gradients: OnceLock<Tape>,
     gradient_intervals: OnceLock<Tape>,
     hessians: OnceLock<Tape>,
-    /// None for formulas with kinks and long ones.
-    hessian_intervals: OnceLock<Option<Tape>>,
 }
-
-/// Nodes of a formula up to which its second derivatives are enclosed: they have some ten times
-/// as many, and the boxes that they spare must pay for that.
-const MOST_BENT_NODES: usize = 1000;
 
 impl Formula {
     /// Reads a formula; `parameters` are the values of names that it may use.
@@ -86,7 +80,6 @@ impl Formula {
             gradients: OnceLock::new(),
             gradient_intervals: OnceLock::new(),
             hessians: OnceLock::new(),
-            hessian_intervals: OnceLock::new(),
             dag,
             root,
         })
@@ -145,18 +138,6 @@ impl Formula {
             let roots: Vec<NodeId> = [self.root].into_iter().chain(first).chain(second).collect();
             compile(&dag, &roots, self.dag.n_nodes(), Target::Points)
         })
-    }
-
-    fn hessian_interval_tape(&self) -> Option<&Tape> {
-        let compiled = self.hessian_intervals.get_or_init(|| {
-            if self.dag.n_nodes() > MOST_BENT_NODES {
-                return None;
-            }
-            let (dag, _, second) = self.second_derivatives();
-            dag.has_continuous_slopes(&[self.root])
-                .then(|| compile(&dag, &second, self.dag.n_nodes(), Target::Intervals))
-        });
-        compiled.as_ref()
     }
 
     fn second_derivatives(&self) -> (Dag, [NodeId; 3], [NodeId; 6]) {
@@ -223,31 +204,5 @@ impl Field for Formula {
 
     fn kinks_between(&self, a: Vec3, b: Vec3) -> Vec<&'static str> {
         kinks::between(&self.dag, self.root, a, b)
-    }
-
-    fn hessian_enclosures(&self, domains: &[[Interval; 3]], out: &mut [Option<HessianIntervals>]) {
-        let Some(tape) = self.hessian_interval_tape() else { return out.fill(None) };
-        enclose_all::<6, _>(tape, domains, out, Some);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn formulas_with_kinks_have_no_form_of_second_order_and_blends_have_one() {
-        let has_bends = |text: &str| {
-            let field = Formula::parse(text, &BTreeMap::new()).unwrap();
-            let mut hessians = [None];
-            field.hessian_enclosures(&[[Interval::new(0.5, 1.0); 3]], &mut hessians);
-            hessians[0].is_some()
-        };
-        for text in ["abs(x) - 1", "max(x, y)", "mod(x, 2) + z", "atan2(y, x)", "x^y", "sign(z)"] {
-            assert!(!has_bends(text), "{text}");
-        }
-        for text in ["x^2 + y^2 - 1", "smin(x, y, 0.3)", "sqrt(x*y) + sin(z)/x", "x^-2"] {
-            assert!(has_bends(text), "{text}");
-        }
     }
 }
