@@ -8,8 +8,10 @@ use crate::{PolygonizeError, singular};
 use isospline_geometry::{Aabb, Vec3};
 use isospline_stage::{Counters, Ctx, map};
 
-/// Cells or cubes a task.
+/// Cells a task.
 const CELLS_A_TASK: usize = 64;
+/// Cubes a task in refinement rounds: a small model has a few hundred, each of many boxes.
+const CUBES_A_TASK: usize = 16;
 /// Failing tetrahedra from which a singular point is searched, spread over all that fail.
 const SEARCHES: usize = 16;
 /// Failing tetrahedra, of those that the surface passes, from which on it may be singular
@@ -98,7 +100,7 @@ fn failing_tetrahedra(
     // Stable: within a cube the order stays.
     homes.sort_by_key(|&(cube, _)| cube);
     let cubes: Vec<_> = homes.chunk_by(|a, b| a.0 == b.0).collect();
-    let shares: Vec<_> = cubes.chunks(CELLS_A_TASK).collect();
+    let shares: Vec<_> = cubes.chunks(CUBES_A_TASK).collect();
     let cube = |members: &&[((Site, u32), Tetrahedron)]| {
         let (lo, width) = members[0].0;
         Cube {
