@@ -12,6 +12,7 @@ mod mending;
 mod model;
 pub mod report;
 pub mod stages;
+pub mod text_file;
 pub mod tolerance;
 
 pub use box_search::Reach;

@@ -2,6 +2,7 @@
 
 use crate::box_search::{self, Reach};
 use crate::config::{ConfigError, Domain, Inside, ModelFile};
+use crate::text_file::read_text;
 use isospline_artifact::kinds::{Mesh, Topology};
 use isospline_geometry::Aabb;
 use isospline_implicit::{
@@ -202,7 +203,7 @@ fn short(x: f64) -> f64 {
 }
 
 fn read_base_mesh(path: &Path) -> Result<(Given, String), ModelError> {
-    let text = std::fs::read_to_string(path)
+    let text = read_text(path)
         .map_err(|source| ModelError::MeshUnreadable { path: path.to_owned(), source })?;
     let (position, face) =
         parse_obj(&text).map_err(|error| ModelError::Mesh { path: path.to_owned(), error })?;

@@ -5,6 +5,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::say;
 use isospline::ModelError;
 use isospline::config::{ConfigError, ModelFile, foreign_as_toml};
+use isospline::text_file::read_text;
 use isospline_artifact::{Durability, write_file_atomic};
 use isospline_implicit::{ForeignFormat, Formula};
 
@@ -13,7 +14,7 @@ pub(crate) fn import(args: &ImportArgs) -> Result<u8, Failure> {
     let format = ForeignFormat::of(&args.file).ok_or_else(|| {
         Failure::usage(format!("{} is neither .jsurf nor .vm", args.file.display()))
     })?;
-    let text = std::fs::read_to_string(&args.file)
+    let text = read_text(&args.file)
         .map_err(|source| ConfigError::Read { path: args.file.clone(), source })?;
     let toml = foreign_as_toml(&args.file, format, &text)?;
     // What is written can be read: a formula that cannot is told here, with its place.

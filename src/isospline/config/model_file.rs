@@ -3,6 +3,7 @@
 use crate::config::tables::{out_of_range, refuse_unknown_tables, typed};
 use crate::config::target::give_way;
 use crate::config::{ConfigError, Document, StageParams, TargetTable, foreign_as_toml};
+use crate::text_file::read_text;
 use isospline_check::CheckParams;
 use isospline_export::LengthUnit;
 use isospline_geometry::{Aabb, Vec3};
@@ -115,7 +116,7 @@ impl ModelFile {
     /// # Errors
     /// The first thing that is wrong with the file or an override.
     pub fn open(path: &Path, overrides: &[String]) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path)
+        let text = read_text(path)
             .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
         let name = path.display().to_string();
         let mut doc = match ForeignFormat::of(path) {
