@@ -6,7 +6,7 @@
 
 use crate::cli::failure::{MORE_MEMORY, NO_MEMORY};
 use std::fs::File;
-use std::io::Write;
+use std::io::{Cursor, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -46,12 +46,12 @@ enum Stream {
 }
 
 /// Writes a message as far as that can be done.
-fn write_to(stream: Stream, message: impl FnOnce(&mut &mut [u8]) -> std::io::Result<()>) {
+fn write_to(stream: Stream, message: impl FnOnce(&mut Cursor<&mut [u8]>) -> std::io::Result<()>) {
     let mut room = [0; LONGEST];
-    let mut rest = &mut room[..];
+    let mut line = Cursor::new(&mut room[..]);
     // What does not fit is cut off.
-    drop(message(&mut rest));
-    let length = LONGEST - rest.len();
+    drop(message(&mut line));
+    let length = line.position() as usize;
     if let Some(mut file) = unlocked(stream) {
         // A closed pipe cannot be told anything.
         drop(file.write_all(&room[..length]));
