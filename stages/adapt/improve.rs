@@ -48,7 +48,7 @@ pub(crate) fn improve(
     };
     for round in 0..n_rounds {
         ctx.host.progress(u64::from(round), u64::from(n_rounds))?;
-        let others = cache.diagonals(surface, |h| may_flip(surface, h));
+        let others = cache.diagonals(surface, |h| keeps_shape(surface, h));
         let flipped = flip_round(surface, &gate, &errors, &others);
         if flipped > 0 {
             errors = cache.edges(surface);
@@ -171,21 +171,23 @@ fn flip_round(
 }
 
 fn flip_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge) -> bool {
-    may_flip(surface, h)
+    let Some(wings) = surface.wings(h) else { return false };
+    let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
+    ends.iter().all(|&v| surface.mesh.valence(v) > 4)
+        && wings.iter().all(|&v| surface.mesh.valence(v) < 10)
+        && keeps_shape(surface, h)
         && surface.flip_cost(gate, h).is_some_and(|[before, after]| after <= before.max(ROOM))
 }
 
-/// Whether valences and the shapes of the faces allow the flip.
-fn may_flip(surface: &SurfaceMesh<'_>, h: HalfEdge) -> bool {
+/// Whether a flip leaves no sliver. Unlike valences this stays so until a face beside the edge
+/// changes: edges that a round begins without it cannot flip in that round.
+fn keeps_shape(surface: &SurfaceMesh<'_>, h: HalfEdge) -> bool {
     let Some(wings) = surface.wings(h) else { return false };
     let [c, d] = wings.map(|v| surface.at(v));
     let [a, b] = surface.ends(h);
     let quality_of = |faces: [[&Vertex; 3]; 2]| quality(&faces[0]).min(quality(&faces[1]));
     let before = quality_of([[a, b, c], [b, a, d]]);
-    let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
     quality_of([[d, c, a], [c, d, b]]) >= before.min(0.2)
-        && ends.iter().all(|&v| surface.mesh.valence(v) > 4)
-        && wings.iter().all(|&v| surface.mesh.valence(v) < 10)
 }
 
 /// Merges up to `n_wanted` edges whose new curves stay below `limit`; best first.
