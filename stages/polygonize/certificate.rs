@@ -17,9 +17,10 @@ use crate::transversal::BoxForms;
 use isospline_geometry::Vec3;
 use isospline_implicit::{Affine, AffineJet, Field, Interval, IntervalJet, Jet1};
 
-/// Boxes that one cube may take. Expanded polynomials of high degree (the double torus) need a few
-/// hundred where their gradient is small; more only delays refinement where it is due.
-const MOST_BOXES: u32 = 400;
+/// Boxes that one cube may take. Expanded polynomials of high degree (the double torus, the chair)
+/// need a few hundred where their gradient is small; more only delays refinement where it is due.
+/// With 400 the chair has a third more tetrahedra to refine.
+const MOST_BOXES: u32 = 800;
 /// Halvings of a cube, over all axes, after which a box counts as failed.
 const MOST_HALVINGS: u32 = 15;
 /// Tetrahedra that turn from the gradient so far that their cosine is below this, at points of
