@@ -3,13 +3,23 @@
 // symbols: M, g normal matrix and gradient over the 45 coordinates, S the Schur complement of
 // the innermost points, Z the map from moves to coordinates
 
-use crate::face_moves::{FaceMoves, INNER, OUTER, REACHING, elimination_order};
-use crate::samples::{Interior, LANES, Samples};
+#![expect(clippy::inline_always, reason = "kernels are compiled for several processors")]
+
+use crate::face_moves::{
+    FaceMoves, INNER, OUTER, REACHING, Row, WIDTH, add, elimination_order, lanes,
+};
+use crate::functionals::LANES;
+use crate::samples::{Interior, Samples};
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_triangle::N_INTERIOR;
 use isospline_geometry::linear::{cholesky, cholesky_solve};
+use isospline_implicit::{Kernel, run_widest};
 
 const ALL: usize = OUTER + INNER;
+/// As many coordinates, filled up to whole vectors.
+const FILLED: usize = ALL.next_multiple_of(LANES);
+/// Rows that are summed at once.
+const TOGETHER: usize = 5;
 
 /// What draws the samples of a face aside, to places where it has no folds.
 #[derive(Clone, Debug)]
@@ -23,36 +33,70 @@ pub(crate) struct Pull {
 /// The equations of a face with its innermost points eliminated.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
-    /// `Z^T S Z`.
-    pub(crate) matrix: [[f64; REACHING]; REACHING],
-    /// `Z^T g`, reduced likewise.
-    pub(crate) gradient: [f64; REACHING],
-    /// Row of each innermost coordinate: minus its answer to the outer ones, and its own step.
-    inner: [[f64; OUTER + 1]; INNER],
+    /// `Z^T S Z`, then a column of `Z^T g`, reduced likewise.
+    pub(crate) matrix: [Row; REACHING],
+    /// Row of each innermost coordinate: minus its answer to the outer ones, then minus its own step.
+    inner: [Row; INNER],
+}
+
+/// Half the mean cost at the samples of a face, linearised in the control points, plus half of
+/// `damping` times their squared shifts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Equations<'a> {
+    pub(crate) samples: &'a Samples,
+    pub(crate) moves: &'a FaceMoves,
+    /// Derivative of half the cost by the distance at each sample: the distance, where nothing
+    /// else has a weight.
+    pub(crate) force: &'a [f64],
+    /// Unit normal of the field there.
+    pub(crate) normal: &'a [Vec3],
+    /// Adds half the mean squared distance in the tangent planes from other places.
+    pub(crate) pull: Option<&'a Pull>,
+    pub(crate) damping: f64,
+}
+
+struct Setting<'a> {
+    element: &'a mut Element,
+    equations: Equations<'a>,
+}
+
+impl Kernel for Setting<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Self { element, equations } = self;
+        let (m, g) = (equations.matrix(), equations.gradient());
+        let mut schur = [[0.0; WIDTH]; OUTER];
+        if !condense(&m, &g, &mut schur, &mut element.inner) {
+            return false;
+        }
+        let mut half = [[0.0; WIDTH]; REACHING];
+        equations.moves.transposed_times(&schur, &mut half);
+        // The Schur complement is symmetric.
+        let columns = std::array::from_fn(|i| {
+            let mut column = [0.0; WIDTH];
+            column.iter_mut().zip(&half).for_each(|(x, row)| *x = row[i]);
+            column
+        });
+        equations.moves.transposed_times(&columns, &mut element.matrix);
+        for (row, half) in element.matrix.iter_mut().zip(&half) {
+            row[REACHING] = half[OUTER];
+        }
+        true
+    }
 }
 
 impl Element {
-    /// Half the mean squared distance, linearised in the control points, plus half of `damping`
-    /// times their squared shifts.
-    ///
-    /// `distance` and unit `normal` of the field at the samples; `pull`, if given, adds half the
-    /// mean squared distance in the tangent planes from other places. `None` if the equations are not
-    /// positive definite, which only numbers that are not finite bring about.
-    pub(crate) fn new(
-        samples: &Samples,
-        face: &FaceMoves,
-        distance: &[f64],
-        normal: &[Vec3],
-        pull: Option<&Pull>,
-        damping: f64,
-    ) -> Option<Self> {
-        let weight = pull.map_or(0.0, |pull| pull.weight);
-        let m = normal_matrix(samples, normal, weight, damping);
-        let g = gradient(samples, distance, normal, pull);
-        let (schur, reduced, inner) = condense(&m, &g)?;
-        let matrix = face.times(&face.transposed_times(&schur));
-        let gradient = face.transposed_times(&reduced.map(|x| [x])).map(|[x]| x);
-        Some(Self { matrix, gradient, inner })
+    /// No equations yet.
+    pub(crate) fn zero() -> Self {
+        Self { matrix: [[0.0; WIDTH]; REACHING], inner: [[0.0; WIDTH]; INNER] }
+    }
+
+    /// Becomes the element of these equations; false if they are not positive definite, which only
+    /// numbers that are not finite bring about.
+    pub(crate) fn set(&mut self, equations: Equations<'_>) -> bool {
+        run_widest(Setting { element: self, equations })
     }
 
     /// Shifts of the 15 points, in storage order, when the outer ones shift by `outer`.
@@ -79,24 +123,92 @@ fn places() -> [usize; N_INTERIOR] {
     out
 }
 
-/// `M = damping + mean over samples of b b^T (x) (N N^T + weight (I - N N^T))`.
-fn normal_matrix(
-    samples: &Samples,
-    normal: &[Vec3],
-    weight: f64,
-    damping: f64,
-) -> [[f64; ALL]; ALL] {
-    let square = |n: &Vec3| {
-        let m = (1.0 - weight) * n;
-        let [xx, yy, zz] = [0, 1, 2].map(|k| m[k] * n[k] + weight);
-        [xx, m.x * n.y, m.x * n.z, yy, m.y * n.z, zz]
-    };
-    let squares: Vec<[f64; 6]> = normal.iter().map(square).collect();
+impl Equations<'_> {
+    /// `M = damping + mean over samples of b b^T (x) (N N^T + weight (I - N N^T))`, `weight` that of
+    /// the pull.
+    #[inline(always)]
+    fn matrix(&self) -> [[f64; ALL]; ALL] {
+        let weight = self.pull.map_or(0.0, |pull| pull.weight);
+        let square = |n: &Vec3| {
+            let m = (1.0 - weight) * n;
+            let [xx, yy, zz] = [0, 1, 2].map(|k| m[k] * n[k] + weight);
+            [xx, m.x * n.y, m.x * n.z, yy, m.y * n.z, zz]
+        };
+        let squares: Vec<[f64; 6]> = self.normal.iter().map(square).collect();
+        let mut m = [[0.0; ALL]; ALL];
+        put_pairs(&mut m, &self.samples.pairs, &squares);
+        self.add_differences(&mut m);
+        for (i, row) in m.iter_mut().enumerate() {
+            row[i] += self.damping;
+        }
+        m
+    }
+
+    /// Adds the mean square of the changes of the distance's differences. Each sample has its own
+    /// normal: with one for all three, shifts along the surface would seem to make it rough.
+    #[inline(always)]
+    fn add_differences(&self, m: &mut [[f64; ALL]; ALL]) {
+        let changes = self.changes_of_differences();
+        for first in (0..ALL).step_by(LANES) {
+            for top in (first / TOGETHER * TOGETHER..ALL).step_by(TOGETHER) {
+                let sums = products(&changes, top, first);
+                for (i, row) in (top..).zip(&sums) {
+                    for (j, x) in (first..=i).zip(row) {
+                        m[i][j] += x;
+                        m[j][i] = m[i][j];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Change of each difference with the coordinates, times the root of its weight.
+    #[inline(always)]
+    fn changes_of_differences(&self) -> Vec<[f64; FILLED]> {
+        let places = places();
+        let Samples { inner, roughness, .. } = self.samples;
+        let scale = (roughness.weight() / inner.len() as f64).sqrt();
+        let change = |difference: [(usize, f64); 3]| {
+            let mut change = [0.0; FILLED];
+            for (s, factor) in difference.into_iter().filter(|(s, _)| *s < inner.len()) {
+                let normal = scale * factor * self.normal[s];
+                for (place, w) in places.iter().zip(&inner[s]) {
+                    (0..3).for_each(|x| change[3 * place + x] += w * normal[x]);
+                }
+            }
+            change
+        };
+        roughness.differences().map(change).collect()
+    }
+
+    #[inline(always)]
+    fn gradient(&self) -> [f64; ALL] {
+        let places = places();
+        let scale = 1.0 / self.force.len() as f64;
+        let mut g = [0.0; ALL];
+        for (s, row) in self.samples.inner.iter().enumerate() {
+            let aside = self.pull.map_or(Vec3::zeros(), |pull| pull.weight * pull.aside[s]);
+            let force = scale * (self.force[s] * self.normal[s] + aside);
+            for (place, w) in places.iter().zip(row) {
+                for x in 0..3 {
+                    g[3 * place + x] += w * force[x];
+                }
+            }
+        }
+        g
+    }
+}
+
+/// Puts into both triangles the sums over the samples of the weights of a pair of points times
+/// `[xx, xy, xz, yy, yz, zz]`.
+#[inline(always)]
+fn put_pairs(m: &mut [[f64; ALL]; ALL], pairs: &[Vec<[f64; LANES]>], squares: &[[f64; 6]]) {
     let places = places();
-    let mut m = [[0.0; ALL]; ALL];
     let mut all = (0..N_INTERIOR).flat_map(|i| (0..=i).map(move |j| (i, j)));
-    for weights in &samples.pairs {
-        for [xx, xy, xz, yy, yz, zz] in weighted_sums(weights, &squares) {
+    for weights in pairs {
+        let sums = weighted_sums(weights, squares);
+        for lane in 0..LANES {
+            let [xx, xy, xz, yy, yz, zz] = sums.map(|sum| sum[lane]);
             let (i, j) = all.next().expect("invariant: sums of as many pairs");
             let (i, j) = (3 * places[i], 3 * places[j]);
             let block = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
@@ -108,71 +220,68 @@ fn normal_matrix(
             }
         }
     }
-    for (i, row) in m.iter_mut().enumerate() {
-        row[i] += damping;
-    }
-    m
 }
 
-/// Sums over the samples of a few weights each times six numbers: half of all the work, so the
-/// sums stay in registers.
-fn weighted_sums(weights: &[[f64; LANES]], numbers: &[[f64; 6]]) -> [[f64; 6]; LANES] {
-    let mut sums = [[0.0; 6]; LANES];
-    for (w, x) in weights.iter().zip(numbers) {
-        for lane in 0..LANES {
-            for k in 0..6 {
-                sums[lane][k] += w[lane] * x[k];
+/// Sums over `rows` of the products of [`TOGETHER`] columns from `top` on with [`LANES`] from `first`
+/// on.
+#[inline(always)]
+fn products(rows: &[[f64; FILLED]], top: usize, first: usize) -> [[f64; LANES]; TOGETHER] {
+    let mut sums = [[0.0; LANES]; TOGETHER];
+    for row in rows {
+        for r in 0..TOGETHER {
+            for lane in 0..LANES {
+                sums[r][lane] += row[top + r] * row[first + lane];
             }
         }
     }
     sums
 }
 
-fn gradient(
-    samples: &Samples,
-    distance: &[f64],
-    normal: &[Vec3],
-    pull: Option<&Pull>,
-) -> [f64; ALL] {
-    let places = places();
-    let scale = 1.0 / distance.len() as f64;
-    let mut g = [0.0; ALL];
-    for (s, row) in samples.inner.iter().enumerate() {
-        let aside = pull.map_or(Vec3::zeros(), |pull| pull.weight * pull.aside[s]);
-        let force = scale * (distance[s] * normal[s] + aside);
-        for (place, w) in places.iter().zip(row) {
-            for x in 0..3 {
-                g[3 * place + x] += w * force[x];
+/// Sums over the samples of a few weights each times six numbers: half of all the work, so the
+/// sums stay in registers.
+#[inline(always)]
+fn weighted_sums(weights: &[[f64; LANES]], numbers: &[[f64; 6]]) -> [[f64; LANES]; 6] {
+    let mut sums = [[0.0; LANES]; 6];
+    for (w, x) in weights.iter().zip(numbers) {
+        for k in 0..6 {
+            for lane in 0..LANES {
+                sums[k][lane] += w[lane] * x[k];
             }
         }
     }
-    g
+    sums
 }
 
-type Condensed = ([[f64; OUTER]; OUTER], [f64; OUTER], [[f64; OUTER + 1]; INNER]);
-
-/// Eliminates the innermost points.
-fn condense(m: &[[f64; ALL]; ALL], g: &[f64; ALL]) -> Option<Condensed> {
+/// Eliminates the innermost points: the Schur complement with the reduced gradient beside it, and
+/// what `inner` keeps. False if the equations of these points are not positive definite.
+#[inline(always)]
+fn condense(
+    m: &[[f64; ALL]; ALL],
+    g: &[f64; ALL],
+    schur: &mut [Row; OUTER],
+    inner: &mut [Row; INNER],
+) -> bool {
+    for i in 0..OUTER {
+        schur[i][..OUTER].copy_from_slice(&m[i][..OUTER]);
+        schur[i][OUTER] = g[i];
+    }
     let mut corner = [[0.0; INNER]; INNER];
-    let mut inner = [[0.0; OUTER + 1]; INNER];
     for i in 0..INNER {
         corner[i].copy_from_slice(&m[OUTER + i][OUTER..]);
         inner[i][..OUTER].copy_from_slice(&m[OUTER + i][..OUTER]);
         inner[i][OUTER] = g[OUTER + i];
     }
-    cholesky_solve(&cholesky(&corner).ok()?, &mut inner);
-    let mut schur = [[0.0; OUTER]; OUTER];
-    let mut reduced = [0.0; OUTER];
-    for i in 0..OUTER {
-        schur[i].copy_from_slice(&m[i][..OUTER]);
-        reduced[i] = g[i];
-        for (k, row) in inner.iter().enumerate() {
-            let w = m[i][OUTER + k];
-            reduced[i] -= w * row[OUTER];
-            for (s, x) in schur[i].iter_mut().zip(row) {
-                *s -= w * x;
-            }
+    let Ok(factor) = cholesky(&corner) else { return false };
+    for first in (0..WIDTH).step_by(LANES) {
+        let mut columns = inner.each_ref().map(|row| lanes(row, first));
+        cholesky_solve(&factor, &mut columns);
+        for (row, column) in inner.iter_mut().zip(&columns) {
+            row[first..first + LANES].copy_from_slice(column);
+        }
+        for (m, schur) in m.iter().zip(schur.iter_mut()) {
+            let weights: [f64; INNER] = std::array::from_fn(|k| -m[OUTER + k]);
+            add(schur, first, &weights, &columns);
         }
     }
-    Some((schur, reduced, inner))
+    true
 }

@@ -3,10 +3,15 @@
 //! Sums run in index order with separate multiplications and additions, in register blocks that
 //! any compiler vectorises: the bits do not depend on the processor.
 
+#![expect(clippy::inline_always, reason = "kernels are compiled for several processors")]
+
+use isospline_implicit::{Kernel, run_widest};
+
 /// Side of a block.
 const SIDE: usize = 8;
-/// Side of the part of a block that is summed in registers.
-const HALF: usize = SIDE / 2;
+
+/// Columns of a block that are summed at once: eight registers of four floats.
+const COLUMNS: usize = 4;
 
 /// Columns first.
 type Block = [[f64; SIDE]; SIDE];
@@ -59,6 +64,11 @@ impl Envelope {
 
     /// Factorises in place; false if a pivot is not a positive finite number.
     pub(crate) fn factorise(&mut self) -> bool {
+        run_widest(Factorisation(self))
+    }
+
+    #[inline(always)]
+    fn factorise_blocks(&mut self) -> bool {
         for i in 0..self.first.len() {
             for j in self.first[i]..=i {
                 let from = self.first[i].max(self.first[j]);
@@ -106,32 +116,41 @@ impl Envelope {
     }
 }
 
-/// `block -= sum of a_k b_k^T`.
+struct Factorisation<'a>(&'a mut Envelope);
+
+impl Kernel for Factorisation<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        self.0.factorise_blocks()
+    }
+}
+
+/// `block -= sum of a_k b_k^T`, in parts whose sums stay in registers.
+#[inline(always)]
 fn subtract(block: &mut Block, a: &[Block], b: &[Block]) {
-    for column in [0, HALF] {
-        for row in [0, HALF] {
-            let mut sum = [[0.0; HALF]; HALF];
-            for (a, b) in a.iter().zip(b) {
-                for k in 0..SIDE {
-                    let x = &a[k][row..row + HALF];
-                    let y = &b[k][column..column + HALF];
-                    for c in 0..HALF {
-                        for r in 0..HALF {
-                            sum[c][r] += y[c] * x[r];
-                        }
+    for first in (0..SIDE).step_by(COLUMNS) {
+        let mut sums = [[0.0; SIDE]; COLUMNS];
+        for (a, b) in a.iter().zip(b) {
+            for k in 0..SIDE {
+                for c in 0..COLUMNS {
+                    for r in 0..SIDE {
+                        sums[c][r] += b[k][first + c] * a[k][r];
                     }
                 }
             }
-            for c in 0..HALF {
-                for r in 0..HALF {
-                    block[column + c][row + r] -= sum[c][r];
-                }
+        }
+        for c in 0..COLUMNS {
+            for r in 0..SIDE {
+                block[first + c][r] -= sums[c][r];
             }
         }
     }
 }
 
 /// `block = block l^-T` for a factorised diagonal block.
+#[inline(always)]
 fn divide(block: &mut Block, l: &Block) {
     for c in 0..SIDE {
         for k in 0..c {
@@ -144,6 +163,7 @@ fn divide(block: &mut Block, l: &Block) {
 }
 
 /// Cholesky factor of a diagonal block; what stands above the diagonal is not used.
+#[inline(always)]
 fn factorise(block: &mut Block) -> bool {
     for c in 0..SIDE {
         for k in 0..c {

@@ -1,5 +1,8 @@
 //! How the moves of the exact space reach the control points of one face.
 
+#![expect(clippy::inline_always, reason = "kernels are compiled for several processors")]
+
+use crate::functionals::LANES;
 use crate::moves::Moves;
 use isospline_artifact::kinds::BaseMeshView;
 use isospline_fitting::edge_end::{ccw, cw};
@@ -48,6 +51,12 @@ pub(crate) fn reached_faces(mesh: &BaseMeshView<'_>, h: HalfEdge) -> [u32; 4] {
     let before = cw(mesh, h);
     [h, ccw(mesh, h), before, cw(mesh, before)].map(HalfEdge::face)
 }
+
+/// Columns of the matrices that moves act on: one a coordinate and one for a right-hand side, filled
+/// up to whole vectors.
+pub(crate) const WIDTH: usize = 5 * LANES;
+/// A row of a matrix, zero where it is filled up.
+pub(crate) type Row = [f64; WIDTH];
 
 /// The map from the 33 moves to the 36 coordinates of the outer points.
 #[derive(Clone, Debug)]
@@ -121,55 +130,45 @@ impl FaceMoves {
     }
 
     /// `Z^T m` for the map `Z` and 36 rows `m`.
-    pub(crate) fn transposed_times<const N: usize>(
-        &self,
-        m: &[[f64; N]; OUTER],
-    ) -> [[f64; N]; REACHING] {
-        let mut out = [[0.0; N]; REACHING];
-        for k in 0..3 {
-            for c in 0..BESIDE {
-                let sum = &mut out[column(k, c)];
-                for r in 0..9 {
-                    add(sum, self.edges[k][r][c], &m[9 * k + r]);
-                }
-            }
-            for (c, shift) in self.twists[k].iter().enumerate() {
-                let sum = &mut out[twist_column(k) + c];
-                for x in 0..3 {
-                    add(sum, shift[x], &m[27 + 3 * k + x]);
-                }
-            }
-        }
-        out
-    }
-
-    /// `m Z` for rows `m` of 36.
-    pub(crate) fn times(&self, m: &[[f64; OUTER]; REACHING]) -> [[f64; REACHING]; REACHING] {
-        let mut out = [[0.0; REACHING]; REACHING];
-        for (row, sums) in m.iter().zip(&mut out) {
+    #[inline(always)]
+    pub(crate) fn transposed_times(&self, m: &[Row; OUTER], out: &mut [Row; REACHING]) {
+        *out = [[0.0; WIDTH]; REACHING];
+        // Columns come first: compilers otherwise gather lanes from distant places.
+        for first in (0..WIDTH).step_by(LANES) {
             for k in 0..3 {
-                let mut beside = [0.0; BESIDE];
-                for r in 0..9 {
-                    add(&mut beside, row[9 * k + r], &self.edges[k][r]);
+                let rows: [_; 9] = std::array::from_fn(|r| lanes(&m[9 * k + r], first));
+                for c in 0..BESIDE {
+                    let weights = self.edges[k].each_ref().map(|row| row[c]);
+                    add(&mut out[column(k, c)], first, &weights, &rows);
                 }
-                for (c, x) in beside.into_iter().enumerate() {
-                    sums[column(k, c)] += x;
-                }
-                let own = &row[27 + 3 * k..30 + 3 * k];
+                let rows: [_; 3] = std::array::from_fn(|r| lanes(&m[27 + 3 * k + r], first));
                 for (c, shift) in self.twists[k].iter().enumerate() {
-                    sums[twist_column(k) + c] +=
-                        own[0] * shift.x + own[1] * shift.y + own[2] * shift.z;
+                    add(&mut out[twist_column(k) + c], first, &(*shift).into(), &rows);
                 }
             }
         }
-        out
     }
 }
 
-/// `sum += weight * row`.
-#[inline]
-fn add<const N: usize>(sum: &mut [f64; N], weight: f64, row: &[f64; N]) {
-    for (s, x) in sum.iter_mut().zip(row) {
-        *s += weight * x;
+/// Eight columns of a row.
+#[inline(always)]
+pub(crate) fn lanes(row: &Row, first: usize) -> [f64; LANES] {
+    std::array::from_fn(|lane| row[first + lane])
+}
+
+/// `sum += weights . rows` in eight columns.
+#[inline(always)]
+pub(crate) fn add<const N: usize>(
+    sum: &mut Row,
+    first: usize,
+    weights: &[f64; N],
+    rows: &[[f64; LANES]; N],
+) {
+    let mut part = lanes(sum, first);
+    for (w, row) in weights.iter().zip(rows) {
+        for lane in 0..LANES {
+            part[lane] += w * row[lane];
+        }
     }
+    sum[first..first + LANES].copy_from_slice(&part);
 }

@@ -8,11 +8,13 @@ mod element;
 mod envelope;
 mod error;
 mod face_moves;
+mod functionals;
 mod moves;
 mod numbering;
 mod params;
 mod progress;
 mod restore;
+mod roughness;
 mod samples;
 mod tile_solve;
 mod tiling;
@@ -50,7 +52,7 @@ pub struct Relax {
 
 impl Stage for Relax {
     const NAME: &'static str = "relax";
-    const VERSION: u32 = 2;
+    const VERSION: u32 = 3;
     type Params = RelaxParams;
     type Whole<'a> = (
         BaseMeshView<'a>,
@@ -85,7 +87,7 @@ impl Stage for Relax {
             edges.weights.iter().map(|w| w.nu).collect(),
             tiling.tiles.len(),
         );
-        let samples = Samples::new(self.params.grid);
+        let samples = Samples::new(self.params.grid, self.params.smoothness);
         let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
         let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
         self.sweep(ctx, &problem, &tiling, &mut at)?;

@@ -1,25 +1,20 @@
 //! The sample grid of a patch and the Bernstein values of its control points there.
 
+use crate::functionals::{Functionals, LANES, Values};
+use crate::roughness::Roughness;
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, bernstein, boundary_index, exponents, grid, index,
-    interior_indices,
+    DEGREE, N_CONTROL, N_INTERIOR, bernstein, exponents, grid, index, interior_indices,
 };
 use isospline_geometry::linear::{cholesky, cholesky_solve};
 
 /// The 15 interior control points of a patch, in storage order.
 pub(crate) type Interior = [Vec3; N_INTERIOR];
-/// Pairs of interior points that one pass of [`Samples::pairs`] takes.
-pub(crate) const LANES: usize = 4;
 
-const N_BOUNDARY: usize = N_CONTROL - N_INTERIOR;
 /// Every so many samples the patch is tested for folds: folds are wider than three samples.
 const FOLD_STRIDE: usize = 3;
 /// Cosine of the angle, 10 degrees, from which a patch may be folded between the samples.
 const TILT: f64 = 0.985;
-/// Steps a side between the places on the boundary that are tested: beside the long side of a
-/// sliver, folds do not reach the samples.
-const RIM_STEPS: usize = 12;
 
 /// Values at the samples, the inner points of a barycentric grid.
 #[derive(Clone, Debug)]
@@ -29,33 +24,36 @@ pub(crate) struct Samples {
     /// Products of the values of pairs `(i, j <= i)` of interior points, by rows, over the number
     /// of samples: `[pair / LANES][sample][pair % LANES]`.
     pub(crate) pairs: Vec<Vec<[f64; LANES]>>,
-    /// Values of all points.
-    full: Vec<[f64; N_CONTROL]>,
-    /// Weights of two tangents, counter-clockwise, at every [`FOLD_STRIDE`]th sample.
-    tangents: Vec<[[f64; N_CONTROL]; 2]>,
-    /// Values of all points at places on the boundary, and weights of the two tangents there.
-    rim: Vec<([f64; N_CONTROL], [[f64; N_CONTROL]; 2])>,
+    /// Differences between samples.
+    pub(crate) roughness: Roughness,
+    /// The points at the samples, then two tangents, counter-clockwise, at every
+    /// [`FOLD_STRIDE`]th of them and at the places on the boundary.
+    functionals: Functionals,
+    /// Values of all points at the grid's places on the boundary but the corners: beside the long
+    /// side of a sliver, folds do not reach the samples.
+    rim: Vec<[f64; N_CONTROL]>,
     /// Row of each interior point: its weights of all points in [`Samples::even`].
     even: [[f64; N_CONTROL]; N_INTERIOR],
-    boundary: [usize; N_BOUNDARY],
-    interior: [usize; N_INTERIOR],
 }
 
 impl Samples {
-    /// The inner points of a grid with `steps` steps a side.
-    pub(crate) fn new(steps: u32) -> Self {
-        let is_inner = |p: &[f64; 3]| p.iter().all(|&x| x > 0.0);
-        let places: Vec<[f64; 3]> = grid(steps as usize).filter(is_inner).collect();
+    /// The inner points of a grid with `steps` steps a side; `smoothness` weighs squared differences
+    /// of the distance between them.
+    pub(crate) fn new(steps: u32, smoothness: f64) -> Self {
+        let places: Vec<[f64; 3]> = grid(steps as usize).collect();
+        let is_inner = |p: &&[f64; 3]| p.iter().all(|&x| x > 0.0);
+        let is_rim = |p: &&[f64; 3]| p.contains(&0.0) && p.iter().all(|&x| x < 1.0);
         let values = |&p: &[f64; 3]| bernstein(DEGREE, p).try_into().expect("invariant: 36 values");
-        let full: Vec<[f64; N_CONTROL]> = places.iter().map(values).collect();
+        let full: Vec<[f64; N_CONTROL]> = places.iter().filter(is_inner).map(values).collect();
         let interior = interior_indices();
         let inner: Vec<_> = full.iter().map(|row| interior.map(|i| row[i])).collect();
-        let boundary = std::array::from_fn(|i| boundary_index(DEGREE, i / DEGREE, i % DEGREE));
-        let tangents = places.iter().step_by(FOLD_STRIDE).map(tangent_weights).collect();
-        let is_rim = |p: &[f64; 3]| p.contains(&0.0) && p.iter().all(|&x| x < 1.0);
-        let rim = grid(RIM_STEPS).filter(is_rim).map(|p| (values(&p), tangent_weights(&p)));
-        let (pairs, rim, even) = (pairs(&inner), rim.collect(), even());
-        Self { inner, pairs, full, tangents, rim, even, boundary, interior }
+        let tested = places.iter().filter(is_inner).step_by(FOLD_STRIDE);
+        let tangents = tested.chain(places.iter().filter(is_rim)).flat_map(tangent_weights);
+        let functionals = full.iter().copied().chain(tangents).collect::<Vec<_>>();
+        let rim = places.iter().filter(is_rim).map(values).collect();
+        let roughness = Roughness::new(steps, smoothness);
+        let (pairs, functionals) = (pairs(&inner), Functionals::new(&functionals));
+        Self { inner, pairs, roughness, functionals, rim, even: even() }
     }
 
     /// Samples of a patch.
@@ -63,23 +61,24 @@ impl Samples {
         self.inner.len()
     }
 
-    /// Points of a patch at the samples; `net` gives the boundary, `interior` the rest.
-    pub(crate) fn points(&self, net: &[Vec3; N_CONTROL], interior: &Interior, out: &mut [Vec3]) {
-        for ((full, inner), p) in self.full.iter().zip(&self.inner).zip(out) {
-            let mut sum = Vec3::zeros();
-            for &i in &self.boundary {
-                sum += full[i] * net[i];
-            }
-            for (w, b) in inner.iter().zip(interior) {
-                sum += *w * b;
-            }
-            *p = sum;
-        }
+    /// What the boundary of a net, which does not move, adds to all that is sampled.
+    pub(crate) fn of_boundary(&self, net: &[Vec3; N_CONTROL]) -> Values {
+        self.functionals.of_boundary(net)
+    }
+
+    /// All that is sampled of a patch.
+    pub(crate) fn of(&self, boundary: &Values, interior: &Interior) -> Values {
+        self.functionals.of(boundary, interior)
+    }
+
+    /// Points of a patch at the samples.
+    pub(crate) fn points<'a>(&self, values: &'a Values) -> impl Iterator<Item = Vec3> + 'a {
+        (0..self.len()).map(|i| values.get(i))
     }
 
     /// Places on the boundary of a patch where [`Samples::folded`] looks; they do not move.
     pub(crate) fn rim(&self, net: &[Vec3; N_CONTROL]) -> impl Iterator<Item = Vec3> {
-        self.rim.iter().map(|(weights, _)| combine(weights, net))
+        self.rim.iter().map(|weights| combine(weights, net))
     }
 
     /// Interior points of which each is the mean of its six neighbours in the net: a patch without
@@ -92,21 +91,15 @@ impl Samples {
     /// more than [`TILT`]; with the places on the boundary and `rim_normal`.
     pub(crate) fn folded(
         &self,
-        net: &[Vec3; N_CONTROL],
-        interior: &Interior,
+        values: &Values,
         normal: &[Vec3],
         rim_normal: &[Vec3],
     ) -> [usize; 2] {
-        let mut net = *net;
-        for (&i, &p) in self.interior.iter().zip(interior) {
-            net[i] = p;
-        }
-        let inside = self.tangents.iter().zip(normal.iter().step_by(FOLD_STRIDE));
-        let rim = self.rim.iter().map(|(_, tangents)| tangents).zip(rim_normal);
         let mut counts = [0, 0];
-        for (weights, outward) in inside.chain(rim) {
-            let [a, b] = weights.each_ref().map(|row| combine(row, &net));
-            let own = a.cross(&b);
+        let normals = normal.iter().step_by(FOLD_STRIDE).chain(rim_normal);
+        for (k, outward) in normals.enumerate() {
+            let at = self.len() + 2 * k;
+            let own = values.get(at).cross(&values.get(at + 1));
             let along = own.dot(outward);
             counts[0] += usize::from(along < 0.0);
             counts[1] += usize::from(along < TILT * own.norm());
@@ -186,23 +179,22 @@ mod tests {
 
     #[test]
     fn a_flat_net_is_sampled_at_its_grid_and_seen_upright_from_above_alone() {
-        let samples = Samples::new(12);
+        let samples = Samples::new(12, 0.0);
         let net = flat_net();
         let interior = interior_indices().map(|i| net[i]);
-        let mut points = vec![Vec3::zeros(); samples.len()];
-        samples.points(&net, &interior, &mut points);
+        let values = samples.of(&samples.of_boundary(&net), &interior);
         let inner = grid(12).filter(|p| p.iter().all(|&x| x > 0.0));
-        for (p, [_, v, w]) in points.iter().zip(inner) {
+        for (p, [_, v, w]) in samples.points(&values).zip(inner) {
             assert!((p - Vec3::new(v, w, 0.0)).norm() < 1e-15);
         }
         let up = |n: usize, side: f64| vec![side * Vec3::z(); n];
-        let folded = |side| samples.folded(&net, &interior, &up(55, side), &up(33, side));
+        let folded = |side| samples.folded(&values, &up(55, side), &up(33, side));
         assert_eq!([folded(1.0), folded(-1.0)], [[0; 2], [19 + 33; 2]]);
     }
 
     #[test]
     fn an_even_net_over_a_flat_boundary_is_flat_and_evenly_spaced() {
-        let (samples, net) = (Samples::new(12), flat_net());
+        let (samples, net) = (Samples::new(12, 0.0), flat_net());
         let even = samples.even(&net);
         for (p, i) in even.iter().zip(interior_indices()) {
             assert!((p - net[i]).norm() < 1e-14, "{p} instead of {}", net[i]);

@@ -1,8 +1,9 @@
 //! Gauss-Newton steps of one tile with the rest of the surface fixed.
 
-use crate::element::{Element, Pull};
+use crate::element::{Element, Equations, Pull};
 use crate::envelope::Envelope;
-use crate::face_moves::FaceMoves;
+use crate::face_moves::{FaceMoves, REACHING};
+use crate::functionals::Values;
 use crate::moves::Moves;
 use crate::numbering::Numbering;
 use crate::samples::{Interior, Samples};
@@ -91,7 +92,7 @@ impl Problem<'_> {
                     outcome.interior = Some(trial);
                     outcome.nu = step.nu;
                     outcome.damping = (outcome.damping * RELIEF).max(LEAST_DAMPING);
-                    outcome.gain = 1.0 - there.sum_sq / here.sum_sq;
+                    outcome.gain = 1.0 - there.cost / here.cost;
                     break;
                 }
             }
@@ -121,14 +122,13 @@ impl Problem<'_> {
 
     /// For each face that is folded at the start of the visit, what draws it to an even net.
     fn pulls(&self, visit: &Visit<'_>, interior: &[Interior], at: &Measured) -> Vec<Option<Pull>> {
-        let n = self.samples.len();
-        let [mut points, mut even] = [0, 1].map(|_| vec![Vec3::zeros(); n]);
-        let mut pull = |i: usize| {
-            let net = &visit.faces[i].net;
-            self.samples.points(net, &interior[i], &mut points);
-            self.samples.points(net, &self.samples.even(net), &mut even);
+        let (samples, n) = (self.samples, self.samples.len());
+        let pull = |i: usize| {
+            let face = &visit.faces[i];
+            let [here, even] = [&interior[i], &samples.even(&face.net)]
+                .map(|interior| samples.of(&face.boundary, interior));
             let normals = &at.normal[i * n..(i + 1) * n];
-            let offsets = points.iter().zip(&even).zip(normals);
+            let offsets = samples.points(&here).zip(samples.points(&even)).zip(normals);
             let aside = offsets.map(|((p, e), n)| (p - e) - (p - e).dot(n) * n).collect();
             Pull { weight: UNFOLDING, aside }
         };
@@ -140,13 +140,12 @@ impl Problem<'_> {
         let mut faces: Vec<Face> =
             tile.faces.iter().map(|&f| Face::new(self, f as usize)).collect();
         let places: Vec<Vec3> = faces.iter().flat_map(|f| self.samples.rim(&f.net)).collect();
-        let jets = self.jets(&places);
         // Where the field has no normal nothing is folded.
-        let normal = |jet: &Jet1| jet.gradient.try_normalize(0.0).unwrap_or_default();
-        let mut normals = jets.iter().map(normal);
-        for face in &mut faces {
-            let n = self.samples.rim(&face.net).count();
-            face.rim_normal = normals.by_ref().take(n).collect();
+        let rim = Measured::of(&self.jets(&places));
+        let n = places.len() / faces.len().max(1);
+        for (i, face) in faces.iter_mut().enumerate() {
+            face.rim_normal = rim.normal[i * n..(i + 1) * n].to_vec();
+            face.rim_distance = rim.distance[i * n..(i + 1) * n].to_vec();
         }
         faces
     }
@@ -158,14 +157,20 @@ impl Problem<'_> {
     }
 
     fn measure(&self, faces: &[Face], interior: &[Interior]) -> Measured {
-        let n = self.samples.len();
-        let mut points = vec![Vec3::zeros(); faces.len() * n];
-        for ((face, inner), points) in faces.iter().zip(interior).zip(points.chunks_exact_mut(n)) {
-            self.samples.points(&face.net, inner, points);
-        }
+        let values: Vec<Values> = faces
+            .iter()
+            .zip(interior)
+            .map(|(face, interior)| self.samples.of(&face.boundary, interior))
+            .collect();
+        let points: Vec<Vec3> = values.iter().flat_map(|v| self.samples.points(v)).collect();
         let mut out = Measured::of(&self.jets(&points));
-        for ((face, inner), normals) in faces.iter().zip(interior).zip(out.normal.chunks_exact(n)) {
-            let [folds, tilted] = self.samples.folded(&face.net, inner, normals, &face.rim_normal);
+        for (i, (face, values)) in faces.iter().zip(&values).enumerate() {
+            let rows = i * self.samples.len()..(i + 1) * self.samples.len();
+            let rough = self.samples.roughness.of(&out.distance[rows.clone()], &face.rim_distance);
+            out.force.extend(rough.force);
+            out.cost += rough.sum_sq;
+            let normals = &out.normal[rows];
+            let [folds, tilted] = self.samples.folded(values, normals, &face.rim_normal);
             out.folds.push(folds);
             out.tilted += tilted;
         }
@@ -177,13 +182,15 @@ impl Problem<'_> {
     fn step(&self, visit: &Visit<'_>, pulls: &[Option<Pull>], damping: f64) -> Option<Step> {
         let Visit { tile, faces, numbering, here, .. } = visit;
         let n = self.samples.len();
-        let element = |i: usize| {
+        let mut elements = vec![Element::zero(); faces.len()];
+        for (i, element) in elements.iter_mut().enumerate() {
             let rows = i * n..(i + 1) * n;
-            let (distance, normal) = (&here.distance[rows.clone()], &here.normal[rows]);
-            let (moves, pull) = (&faces[i].moves, pulls[i].as_ref());
-            Element::new(self.samples, moves, distance, normal, pull, damping)
-        };
-        let elements = (0..faces.len()).map(element).collect::<Option<Vec<Element>>>()?;
+            let (force, normal) = (&here.force[rows.clone()], &here.normal[rows]);
+            let (samples, moves, pull) = (self.samples, &faces[i].moves, pulls[i].as_ref());
+            if !element.set(Equations { samples, moves, force, normal, pull, damping }) {
+                return None;
+            }
+        }
         let amounts = solve(numbering, &elements, damping)?;
         let shift = |i: usize| -> Interior {
             let amounts = numbering.columns[i].map(|c| c.map_or(0.0, |c| amounts[c as usize]));
@@ -219,11 +226,15 @@ fn strength(pulls: &[Option<Pull>]) -> f64 {
 struct Face {
     /// Boundary in place, zero inside.
     net: [Vec3; N_CONTROL],
+    /// What the boundary adds to all that is sampled.
+    boundary: Values,
     moves: FaceMoves,
     /// Mean side.
     size: f64,
     /// Unit normals of the field at the places on the boundary that are tested for folds.
     rim_normal: Vec<Vec3>,
+    /// Distances there.
+    rim_distance: Vec<f64>,
 }
 
 impl Face {
@@ -234,9 +245,11 @@ impl Face {
         let size = (side(0) + side(1) + side(2)) / 3.0;
         Self {
             net,
+            boundary: problem.samples.of_boundary(&net),
             moves: FaceMoves::new(&problem.mesh, problem.moves, face),
             size,
             rim_normal: Vec::new(),
+            rim_distance: Vec::new(),
         }
     }
 
@@ -268,8 +281,10 @@ impl Step {
 struct Measured {
     distance: Vec<f64>,
     normal: Vec<Vec3>,
-    /// Sum of squared distances.
-    sum_sq: f64,
+    /// Derivative of half the cost by each distance.
+    force: Vec<f64>,
+    /// Sum of squared distances, and of what their roughness adds.
+    cost: f64,
     /// Folds of each face.
     folds: Vec<usize>,
     /// Samples without a distance, and all folds.
@@ -283,8 +298,8 @@ impl Measured {
     fn of(jets: &[Jet1]) -> Self {
         let n = jets.len();
         let (distance, normal) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        let mut out =
-            Self { distance, normal, sum_sq: 0.0, folds: Vec::new(), unsound: 0, tilted: 0 };
+        let (force, folds) = (Vec::with_capacity(n), Vec::new());
+        let mut out = Self { distance, normal, force, cost: 0.0, folds, unsound: 0, tilted: 0 };
         for jet in jets {
             let slope = jet.gradient.norm();
             let distance = jet.value / slope;
@@ -294,7 +309,7 @@ impl Measured {
                 if is_sound { (distance, jet.gradient / slope) } else { (0.0, Vec3::zeros()) };
             out.distance.push(d);
             out.normal.push(normal);
-            out.sum_sq += d * d;
+            out.cost += d * d;
         }
         out
     }
@@ -304,7 +319,7 @@ impl Measured {
     }
 
     fn is_better_than(&self, other: &Self) -> bool {
-        self.unsound <= other.unsound && self.sum_sq < other.sum_sq
+        self.unsound <= other.unsound && self.cost < other.cost
     }
 }
 
@@ -316,12 +331,9 @@ fn solve(numbering: &Numbering, elements: &[Element], damping: f64) -> Option<Ve
     let mut amounts = vec![0.0; n];
     (0..n).for_each(|i| matrix.add(i, i, AMOUNT_DAMPING * damping));
     for (element, columns) in elements.iter().zip(&numbering.columns) {
-        for (row, gradient, entries) in
-            columns.iter().zip(&element.gradient).zip(&element.matrix).filter_map(
-                |((row, gradient), entries)| Some(((*row)? as usize, gradient, entries)),
-            )
-        {
-            amounts[row] -= gradient;
+        let rows = columns.iter().zip(&element.matrix);
+        for (row, entries) in rows.filter_map(|(row, entries)| Some(((*row)? as usize, entries))) {
+            amounts[row] -= entries[REACHING];
             for (column, x) in columns.iter().zip(entries) {
                 if let Some(column) = column.filter(|c| *c as usize <= row) {
                     matrix.add(row, column as usize, *x);

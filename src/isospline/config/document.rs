@@ -119,6 +119,11 @@ impl Document {
         &self.table
     }
 
+    /// Whether a key of a table is written.
+    pub(crate) fn has(&self, table: &str, key: &str) -> bool {
+        self.table().get(table).is_some_and(|table| table.get(key).is_some())
+    }
+
     /// Where the key of this dotted path stands, or the nearest table above it.
     pub fn key_place(&self, path: &str) -> Option<Place> {
         self.nearest(path).map(|entry| entry.key.clone())

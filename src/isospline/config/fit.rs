@@ -42,8 +42,7 @@ impl Fit {
             }
         };
         for &(table, key, ref value) in values {
-            let written = doc.table().get(table).is_some_and(|table| table.get(key).is_some());
-            if !written {
+            if !doc.has(table, key) {
                 doc.put(table, key, value.clone());
             }
         }
@@ -64,9 +63,9 @@ mod tests {
 
     #[test]
     fn a_fit_sets_the_stages_and_what_the_user_wrote_stays() {
-        assert_eq!(chosen(&[]), "Normal Normal 40 12 2");
-        assert_eq!(chosen(&["target.fit=paper"]), "Paper Paper 40 12 2");
-        assert_eq!(chosen(&["target.fit=full"]), "Normal Normal 40 12 2");
+        assert_eq!(chosen(&[]), "Normal Normal 40 18 2");
+        assert_eq!(chosen(&["target.fit=paper"]), "Paper Paper 40 18 2");
+        assert_eq!(chosen(&["target.fit=full"]), "Normal Normal 40 18 2");
         assert_eq!(chosen(&["target.fit=fast"]), "Paper Normal 16 2 1");
         let mixed = ["target.fit=full", "relax.sweeps=3", "network.method=paper"];
         assert_eq!(chosen(&mixed), "Normal Paper 40 3 2");
