@@ -26,6 +26,8 @@ pub enum Count {
     HalfEdges,
     /// One row a sector: one a smooth vertex, several at a crease.
     Sectors,
+    /// One row a sector, or none.
+    SectorsOrNone,
     /// One row a fan of faces about a vertex.
     Fans,
 }

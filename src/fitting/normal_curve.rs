@@ -7,6 +7,7 @@
 //! cancel both \[derived\]. So only the normal distance is minimised, damped by Levenberg-Marquardt.
 //! Everything happens in units of the chord.
 
+pub mod answer;
 mod conditions;
 mod descent;
 pub mod slant;
@@ -170,6 +171,7 @@ fn nearer(a: Option<NormalCurve>, b: Option<NormalCurve>) -> Option<NormalCurve>
 
 #[cfg(test)]
 mod tests {
+    use super::answer::OWN;
     use super::*;
     use crate::shape::second_fundamental_form;
     use isospline_implicit::ClosureField;
@@ -241,6 +243,79 @@ mod tests {
         let together = fit.fit(&field, &edges, &[None; 3]);
         for (edge, curve) in edges.iter().zip(together) {
             assert_eq!(fit.fit(&field, &[*edge], &[None])[0], curve);
+        }
+    }
+
+    /// Two tangents at each end.
+    fn axes(edge: &NormalEdge) -> [[Vec3; 2]; 2] {
+        edge.ends.normals.map(|n| {
+            let first = n.cross(&Vec3::z()).normalize();
+            [first, n.cross(&first)]
+        })
+    }
+
+    /// The edge after a move of one end, in the units of answers.
+    fn moved(edge: &NormalEdge, end: usize, kind: usize, amount: f64) -> NormalEdge {
+        let mut moved = *edge;
+        let chord = (edge.ends.points[1] - edge.ends.points[0]).norm();
+        let (n, [a, b]) = (edge.ends.normals[end], axes(edge)[end]);
+        match kind {
+            0 => moved.ends.points[end] += amount * chord * n,
+            1 => moved.ends.normals[end] = (n + amount * a).normalize(),
+            2 => moved.ends.normals[end] = (n + amount * b).normalize(),
+            _ => {
+                let entries =
+                    [a * a.transpose(), a * b.transpose() + b * a.transpose(), b * b.transpose()];
+                let m = entries[kind - 3] * (amount / chord);
+                let change = [m.m11, m.m12, m.m13, m.m22, m.m23, m.m33];
+                moved.ends.shapes[end].iter_mut().zip(change).for_each(|(x, y)| *x += y);
+            }
+        }
+        moved
+    }
+
+    #[test]
+    fn the_answer_to_offsets_and_tilts_is_what_curves_fitted_again_give() {
+        let field = ellipsoid(1.0);
+        let fit = NormalFit::new(NormalOptions { iterations: 200, ..OPTIONS });
+        let cost = |edge: &NormalEdge| {
+            let curve = fit.fit(&field, &[*edge], &[None])[0].unwrap();
+            let points = fit.points(edge, &curve);
+            let sum = points.map(|p| (field.value(p) / field.gradient(p).gradient.norm()).powi(2));
+            0.5 * sum.sum::<f64>()
+        };
+        let edge = edge(&field, arc(0.9));
+        let chord = (edge.ends.points[1] - edge.ends.points[0]).norm();
+        let curve = fit.fit(&field, &[edge], &[None])[0].unwrap();
+        let jets: Vec<Jet1> = fit.points(&edge, &curve).map(|p| field.gradient(p)).collect();
+        let answer = fit.answer(&edge, &curve, &jets, &axes(&edge)).unwrap();
+        assert!((chord * chord * answer.cost / cost(&edge) - 1.0).abs() < 1e-6);
+        for (end, kind) in [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)] {
+            let amount = 1e-5;
+            let second = answer.matrix[OWN * end + kind][OWN * end + kind];
+            let predicted = 0.5 * (chord * amount) * (chord * amount) * second;
+            let both = [amount, -amount].map(|amount| cost(&moved(&edge, end, kind, amount)));
+            let found = 0.5 * (both[0] + both[1]) - cost(&edge);
+            // Tilts move curves along the surface too, which is not linear.
+            let within = if kind == 0 { 0.15 } else { 0.5 };
+            let ratio = found / predicted;
+            assert!((ratio - 1.0).abs() < within, "{end} {kind}: {found:e} {predicted:e}");
+        }
+    }
+
+    #[test]
+    fn forms_change_the_conditions_as_their_gradients_say() {
+        let edge = edge(&ellipsoid(1.0), arc(0.9));
+        let conditions = |edge: &NormalEdge| {
+            let frame = Frame::new(edge).unwrap();
+            frame.conditions(&frame.plain())
+        };
+        let frame = Frame::new(&edge).unwrap();
+        let gradients = frame.conditions_by_moves(&frame.plain(), &axes(&edge));
+        for (end, kind) in [(0, 3), (0, 4), (0, 5), (1, 3), (1, 4), (1, 5)] {
+            let changed = conditions(&moved(&edge, end, kind, 0.5))[end] - conditions(&edge)[end];
+            let predicted = 0.5 * gradients[end][OWN * end + kind];
+            assert!((changed - predicted).abs() < 1e-13, "{end} {kind}: {changed} {predicted}");
         }
     }
 

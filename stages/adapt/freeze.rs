@@ -47,6 +47,7 @@ pub fn freeze(mesh: &TriangleMesh, field: &dyn Field) -> Result<BaseMesh, Freeze
     Ok(BaseMesh {
         position: mesh.positions.iter().map(|&p| p.into()).collect(),
         frame: frames(&mesh, field, &component)?,
+        shape: Vec::new(),
         face: mesh.faces.clone(),
         face_sheet: component,
         edge_kind: vec![EdgeKind::Smooth.code(); edges.ends.len()],

@@ -8,6 +8,7 @@
 mod curve_error;
 mod error;
 mod error_cache;
+mod free_vertices;
 pub mod freeze;
 mod gate;
 mod improve;
@@ -19,7 +20,7 @@ mod surface_mesh;
 mod vertex;
 
 pub use error::AdaptError;
-pub use params::{AdaptParams, Curves, Improve};
+pub use params::{AdaptParams, Curves, Improve, Vertices};
 
 use curve_error::Measure;
 use error_cache::ErrorCache;
@@ -71,7 +72,11 @@ impl Stage for Adapt {
         counters.count("faces_out", fit.faces.len() as u64);
         let excess = fit.faces.len().saturating_sub(mesh.face.len());
         counters.repair("faces_over_target", excess as u64);
-        Ok(Piece { rows: freeze::freeze(&fit, ctx.field)?, counters })
+        let mut rows = freeze::freeze(&fit, ctx.field)?;
+        if self.params.vertices == Vertices::Free {
+            free_vertices::settle(ctx, &mut rows, &mut counters)?;
+        }
+        Ok(Piece { rows, counters })
     }
 }
 

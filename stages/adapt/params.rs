@@ -24,6 +24,17 @@ pub enum Curves {
     Paper,
 }
 
+/// Whether curves pass through points of the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Vertices {
+    /// Vertices lie on the surface, with its normals.
+    #[default]
+    OnSurface,
+    /// Vertices leave it, by about the error of the curves, where that brings the curves nearer.
+    Free,
+}
+
 /// Parameters of the repair.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -48,6 +59,8 @@ pub struct AdaptParams {
     /// Middles of faces, model units, that are split across their longest side when all else is
     /// done, list after list; a middle that no face has is left out.
     pub splits: Vec<Vec<[f64; 3]>>,
+    /// Whether vertices stay on the surface.
+    pub vertices: Vertices,
 }
 
 impl Default for AdaptParams {
@@ -62,6 +75,7 @@ impl Default for AdaptParams {
             curves: Curves::Normal,
             normal_rounds: 12,
             splits: Vec::new(),
+            vertices: Vertices::OnSurface,
         }
     }
 }

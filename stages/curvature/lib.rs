@@ -18,7 +18,8 @@ pub struct CurvatureParams {}
 
 impl Params for CurvatureParams {}
 
-/// Evaluates `M = -P H P / |grad f|` (see [`second_fundamental_form`]).
+/// Evaluates `M = -P H P / |grad f|` (see [`second_fundamental_form`]), or takes over the forms that
+/// free vertices were given.
 #[derive(Clone, Copy, Debug)]
 pub struct CurvatureStage;
 
@@ -55,6 +56,10 @@ impl Stage for CurvatureStage {
         (): (),
         task: &Task,
     ) -> Result<Piece<Curvature>, CurvatureError> {
+        if !mesh.shape.is_empty() {
+            let shape = mesh.shape[task.writes[0].clone()].to_vec();
+            return Ok(Piece { rows: Curvature { shape }, counters: Counters::default() });
+        }
         let at = |s: usize| Vec3::from(mesh.position[mesh.frame[s].vertex as usize]);
         let points: Vec<Vec3> = task.writes[0].clone().map(at).collect();
         let zero = Jet2 { value: 0.0, gradient: Vec3::zeros(), hessian: [0.0; 6] };

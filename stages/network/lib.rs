@@ -10,12 +10,11 @@ use isospline_artifact::kinds::{
     BaseMeshView, Bounds, CurvatureView, CurveFit, CurveStatus, Network,
 };
 use isospline_fitting::curve_samples::Samples;
-use isospline_fitting::edge_end::{ccw, cw};
 use isospline_fitting::normal_curve::slant::Slant;
 use isospline_fitting::normal_curve::{NormalCurve, NormalEdge, NormalFit, NormalOptions};
 use isospline_fitting::paper_curve::{Ends, Solution, fit_curve};
 use isospline_fitting::projection::project_all;
-use isospline_geometry::{HalfEdge, Vec3};
+use isospline_geometry::Vec3;
 use isospline_implicit::Jet1;
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
@@ -70,7 +69,7 @@ impl Stage for NetworkStage {
         let all: Vec<Ends> = edges.clone().map(|e| ends(&mesh, &curvature, e)).collect();
         let mut curves = self.paper_curves(ctx, &mesh, edges.clone(), &all);
         if let Some(fit) = &self.normal {
-            let slants = edges.clone().map(|e| slants(&mesh, e));
+            let slants = edges.clone().map(|e| Slant::at_ends(&mesh, e));
             let all: Vec<NormalEdge> = all
                 .into_iter()
                 .zip(slants)
@@ -154,21 +153,6 @@ fn ends(mesh: &BaseMeshView<'_>, curvature: &CurvatureView<'_>, edge: usize) -> 
         normals: sectors.map(|s| Vec3::from(mesh.frame[s].normal)),
         shapes: sectors.map(|s| curvature.shape[s]),
     }
-}
-
-/// How far the tangents of an edge may turn at its ends.
-fn slants(mesh: &BaseMeshView<'_>, edge: usize) -> [Slant; 2] {
-    let position = |v: u32| Vec3::from(mesh.position[v as usize]);
-    let chord = |h: HalfEdge| {
-        let [a, b] = mesh.edge[mesh.edge_of[h.row()] as usize];
-        let d = position(b) - position(a);
-        if mesh.edge_half[mesh.edge_of[h.row()] as usize][0] == h.0 { d } else { -d }
-    };
-    mesh.edge_half[edge].map(|h| {
-        let h = HalfEdge(h);
-        let normal = Vec3::from(mesh.frame[mesh.sector[h.row()] as usize].normal);
-        Slant::between(&chord(h), &chord(ccw(mesh, h)), &chord(cw(mesh, h)), &normal)
-    })
 }
 
 fn no_curve(mesh: &BaseMeshView<'_>, edge: usize) -> NetworkError {

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 /// Other values of keys whose type does not suggest one.
-const WORDS: [(&str, &[&str]); 9] = [
+const WORDS: [(&str, &[&str]); 10] = [
     ("model.name", &["other"]),
     ("model.formula", &["x^2 + y^2 + z^2 - r - 0.01"]),
     ("model.box", &["[[-1.2, 1.1], [-1.1, 1.1], [-1.1, 1.1]]"]),
@@ -19,6 +19,7 @@ const WORDS: [(&str, &[&str]); 9] = [
     ("adapt.improve", &["never"]),
     ("adapt.curves", &["normal"]),
     ("adapt.splits", &["[[[0.0, 0.0, 1.0]]]"]),
+    ("adapt.vertices", &["free"]),
     ("network.method", &["paper"]),
 ];
 

@@ -6,7 +6,7 @@ use crate::artifact;
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Frame {
-    /// Outward unit normal `grad f / |grad f|`.
+    /// Outward unit normal, `grad f / |grad f|` unless the vertex was left free.
     pub normal: [f64; 3],
     /// `|grad f|`, in units of f a model unit.
     pub gradient_norm: f64,
@@ -75,11 +75,14 @@ artifact! {
     ///
     /// Row `star_first[v] .. star_first[v + 1]` of the sections in star order belong to vertex
     /// `v`; `star_row[h]` is the place of half-edge `h` in that order.
-    pub struct BaseMesh / BaseMeshView = "base_mesh", schema 1 {
-        /// Vertex positions, on the surface.
+    pub struct BaseMesh / BaseMeshView = "base_mesh", schema 2 {
+        /// Vertex positions, on the surface unless they were left free.
         position: [f64; 3], Vertices;
         /// Normals.
         frame: Frame, Sectors;
+        /// Second fundamental forms `[xx, xy, xz, yy, yz, zz]`, 1/length, that free vertices were
+        /// given; none where those of the surface hold.
+        shape: [f64; 6], SectorsOrNone;
         /// Corners of each face, counter-clockwise seen from outside.
         face: [u32; 3], Faces;
         /// Sheet of each face.

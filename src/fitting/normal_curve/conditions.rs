@@ -60,8 +60,19 @@ impl Frame {
         self.chord
     }
 
+    /// Unit normals at both ends.
+    pub(super) fn normals(&self) -> [Vec3; 2] {
+        self.normals
+    }
+
+    /// `q2 - q0` and `q2 - q4`, times the chord.
+    pub(super) fn middle_from_ends(&self, x: &Unknowns) -> [Vec3; 2] {
+        let q2 = Vec3::new(x[4], x[5], x[6]);
+        [q2, q2 - self.q4]
+    }
+
     /// Outset of control point 1 from `q0`, and of `q4` from control point 3.
-    fn leg(&self, x: &Unknowns, end: usize) -> Vec3 {
+    pub(super) fn leg(&self, x: &Unknowns, end: usize) -> Vec3 {
         x[2 * end] * self.along[end] + x[2 * end + 1] * self.beside[end]
     }
 
@@ -126,15 +137,15 @@ impl Frame {
     }
 
     /// `4 l^2 k - 3 (q2 - q_end) . N` at both ends.
-    fn conditions(&self, x: &Unknowns) -> [f64; 2] {
-        let q2 = Vec3::new(x[4], x[5], x[6]);
+    pub(super) fn conditions(&self, x: &Unknowns) -> [f64; 2] {
+        let middle = self.middle_from_ends(x);
         let bend = |end: usize| {
             let ([ee, es, ss], a, b) = (self.forms[end], x[2 * end], x[2 * end + 1]);
             4.0 * (ee * a * a + 2.0 * es * a * b + ss * b * b)
         };
         [
-            bend(0) - 3.0 * q2.dot(&self.normals[0]),
-            bend(1) - 3.0 * (q2 - self.q4).dot(&self.normals[1]),
+            bend(0) - 3.0 * middle[0].dot(&self.normals[0]),
+            bend(1) - 3.0 * middle[1].dot(&self.normals[1]),
         ]
     }
 

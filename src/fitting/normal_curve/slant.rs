@@ -1,6 +1,8 @@
 //! How far the tangent of an edge may turn away from its chord, so that no sector closes.
 
-use isospline_geometry::Vec3;
+use crate::edge_end::{ccw, cw};
+use isospline_artifact::kinds::BaseMeshView;
+use isospline_geometry::{HalfEdge, Vec3};
 
 /// Largest turn of a tangent, radians: 20 degrees.
 const MAX_TURN: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -24,6 +26,21 @@ impl Slant {
     /// 20 degrees to either side: where no neighbours are known.
     pub fn free() -> Self {
         Self([-libm::tan(MAX_TURN), libm::tan(MAX_TURN)])
+    }
+
+    /// The ranges at both ends of an edge.
+    pub fn at_ends(mesh: &BaseMeshView<'_>, edge: usize) -> [Self; 2] {
+        let position = |v: u32| Vec3::from(mesh.position[v as usize]);
+        let chord = |h: HalfEdge| {
+            let e = mesh.edge_of[h.row()] as usize;
+            let [a, b] = mesh.edge[e].map(position);
+            if mesh.edge_half[e][0] == h.0 { b - a } else { a - b }
+        };
+        mesh.edge_half[edge].map(|h| {
+            let h = HalfEdge(h);
+            let normal = Vec3::from(mesh.frame[mesh.sector[h.row()] as usize].normal);
+            Self::between(&chord(h), &chord(ccw(mesh, h)), &chord(cw(mesh, h)), &normal)
+        })
     }
 
     /// The range for an edge that leaves a vertex of this `normal` along `chord`, between edges

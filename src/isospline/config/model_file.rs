@@ -4,6 +4,7 @@ use crate::config::tables::{out_of_range, refuse_unknown_tables, typed};
 use crate::config::target::give_way;
 use crate::config::{ConfigError, Document, StageParams, TargetTable, foreign_as_toml};
 use crate::text_file::read_text;
+use isospline_adapt::Vertices;
 use isospline_check::CheckParams;
 use isospline_export::LengthUnit;
 use isospline_geometry::{Aabb, Vec3};
@@ -13,6 +14,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+
+/// `check.vertices` of a model whose vertices are free to leave the surface: as far as patches may
+/// where nothing is said.
+const FREE_VERTICES: f64 = 1e-3;
 
 /// Where the surface is looked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -161,7 +166,7 @@ impl ModelFile {
         refuse_unknown_tables(doc, &known)?;
         let model: ModelTable = typed(doc, "model", &["base_mesh", "unit"])?;
         let target: TargetTable = typed(doc, "target", &["faces", "tolerance", "tolerance_abs"])?;
-        let check: CheckParams = typed(doc, "check", &["error"])?;
+        let mut check: CheckParams = typed(doc, "check", &["error"])?;
         validate_model(doc, &model)?;
         validate_parameters(doc, &model)?;
         target.validate(doc)?;
@@ -172,6 +177,9 @@ impl ModelFile {
         let mut filled = doc.clone();
         target.fit.fill(&mut filled);
         let stages = StageParams::read(&filled, target.faces())?;
+        if stages.adapt.vertices == Vertices::Free && !doc.has("check", "vertices") {
+            check.vertices = FREE_VERTICES;
+        }
         Ok(Self { model, target, check, stages })
     }
 }
