@@ -105,7 +105,7 @@ mod tests {
     fn only_what_bends_is_rough() {
         let roughness = Roughness::new(12, 0.5);
         let [inner, rim] = sampled(12, |_| 0.0);
-        assert_eq!(roughness.of(&inner, &rim).sum_sq, 0.0);
+        assert!(roughness.of(&inner, &rim).sum_sq <= 0.0);
         // u v w is bent by -2 w / 144 along u - v and so on, and vanishes on the boundary.
         let [inner, rim] = sampled(12, |[u, v, w]| u * v * w);
         let rough = roughness.of(&inner, &rim);
