@@ -11,7 +11,7 @@
 )]
 
 use crate::affine::{ADD_ROUNDING, Affine, MUL_ROUNDING, REST_ROUNDING, TINY, step};
-use crate::instruction_set::InstructionSet;
+use crate::instruction_set::{Kernel, run_widest};
 use crate::interval::Interval;
 use crate::operation::{BinaryOp, UnaryOp};
 use crate::tape::{Instruction, Op, Tape};
@@ -86,42 +86,23 @@ impl Lanes {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-fn run(instructions: &[Instruction], file: &mut [Lanes]) {
-    match InstructionSet::best() {
-        InstructionSet::Avx512 => {
-            #[expect(unsafe_code, reason = "calls code compiled for AVX-512, as intervals do")]
-            // SAFETY: the processor has it, as `best` checks.
-            unsafe {
-                run_avx512(instructions, file);
-            }
-        }
-        InstructionSet::Avx2 => {
-            #[expect(unsafe_code, reason = "calls code compiled for AVX2, as intervals do")]
-            // SAFETY: the processor has it, as `best` checks.
-            unsafe {
-                run_avx2(instructions, file);
-            }
-        }
-        InstructionSet::Plain => interpret(instructions, file),
+/// One pass of a tape over a block.
+struct Pass<'a> {
+    instructions: &'a [Instruction],
+    file: &'a mut [Lanes],
+}
+
+impl Kernel for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        interpret(self.instructions, self.file);
     }
 }
 
-#[cfg(not(target_arch = "x86_64"))]
 fn run(instructions: &[Instruction], file: &mut [Lanes]) {
-    interpret(instructions, file);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn run_avx512(instructions: &[Instruction], file: &mut [Lanes]) {
-    interpret(instructions, file);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2(instructions: &[Instruction], file: &mut [Lanes]) {
-    interpret(instructions, file);
+    run_widest(Pass { instructions, file });
 }
 
 #[inline(always)]
@@ -213,6 +194,9 @@ fn power(a: &Lanes, n: u32, out: &mut Lanes) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instruction_set::InstructionSet;
+    #[cfg(target_arch = "x86_64")]
+    use crate::instruction_set::run_avx2;
     use crate::lowering::{Target, lower};
 
     fn gradient_tape() -> Tape {
@@ -284,7 +268,7 @@ mod tests {
             #[expect(unsafe_code, reason = "the build that `run` would pass over here")]
             // SAFETY: the processor has AVX2, as checked in the line above.
             unsafe {
-                run_avx2(&tape.instructions, &mut vector);
+                run_avx2(Pass { instructions: &tape.instructions, file: &mut vector });
             }
             agrees(&vector);
         }

@@ -10,7 +10,7 @@
 )]
 #![expect(clippy::needless_bitwise_bool, reason = "lazy operators would be branches")]
 
-use crate::instruction_set::InstructionSet;
+use crate::instruction_set::{Kernel, run_widest};
 use crate::interval::{Interval, add_down, mul_down, mul_up};
 use crate::interval_evaluator::{enclose, step};
 use crate::operation::{BinaryOp, UnaryOp};
@@ -83,45 +83,23 @@ impl Lanes {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-fn run(instructions: &[Instruction], file: &mut [Lanes]) {
-    match InstructionSet::best() {
-        InstructionSet::Avx512 => {
-            #[expect(
-                unsafe_code,
-                reason = "calls code compiled for AVX-512: proofs take 0.8 of the time"
-            )]
-            // SAFETY: the processor has it, as `best` checks.
-            unsafe {
-                run_avx512(instructions, file);
-            }
-        }
-        InstructionSet::Avx2 => {
-            #[expect(unsafe_code, reason = "calls code compiled for AVX2: half the time of SSE2")]
-            // SAFETY: the processor has it, as `best` checks.
-            unsafe {
-                run_avx2(instructions, file);
-            }
-        }
-        InstructionSet::Plain => interpret(instructions, file),
+/// One pass of a tape over a block.
+struct Pass<'a> {
+    instructions: &'a [Instruction],
+    file: &'a mut [Lanes],
+}
+
+impl Kernel for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        interpret(self.instructions, self.file);
     }
 }
 
-#[cfg(not(target_arch = "x86_64"))]
 fn run(instructions: &[Instruction], file: &mut [Lanes]) {
-    interpret(instructions, file);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn run_avx512(instructions: &[Instruction], file: &mut [Lanes]) {
-    interpret(instructions, file);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2(instructions: &[Instruction], file: &mut [Lanes]) {
-    interpret(instructions, file);
+    run_widest(Pass { instructions, file });
 }
 
 #[inline(always)]
@@ -256,6 +234,9 @@ fn power(a: &[f64; LANES], n: u32, multiply: impl Fn(f64, f64) -> f64) -> [f64; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instruction_set::InstructionSet;
+    #[cfg(target_arch = "x86_64")]
+    use crate::instruction_set::run_avx2;
     use crate::lowering::{Target, lower};
 
     fn gradient_tape() -> Tape {
@@ -321,7 +302,7 @@ mod tests {
             #[expect(unsafe_code, reason = "the build that `run` would pass over here")]
             // SAFETY: the processor has AVX2, as checked in the line above.
             unsafe {
-                run_avx2(&tape.instructions, &mut vector);
+                run_avx2(Pass { instructions: &tape.instructions, file: &mut vector });
             }
             agrees(&vector);
         }
