@@ -87,7 +87,7 @@ impl<'a> Surface<'a> {
     /// Any [`SurfaceError`]: rows with sound checksums may still name what does not exist.
     pub fn from_patches(patches: &PatchesView<'a>) -> Result<Self, SurfaceError> {
         let meta = patches.meta.first().copied().unwrap_or_default();
-        if (meta.degree, meta.boundary_degree, meta.rational) != (DEGREE as u32, 4, 0) {
+        if !meta.is_known() {
             let (degree, boundary_degree) = (meta.degree, meta.boundary_degree);
             return Err(SurfaceError::Degree { degree, boundary_degree });
         }

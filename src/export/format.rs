@@ -146,7 +146,7 @@ impl Default for Options {
 /// Refuses rows that name what does not exist: sound checksums do not exclude them.
 fn require_coherent(patches: &PatchesView<'_>) -> Result<(), ExportError> {
     let meta = patches.meta.first().copied().unwrap_or_default();
-    if (meta.degree, meta.boundary_degree, meta.rational) != (DEGREE as u32, 4, 0) {
+    if !meta.is_known() {
         let (degree, boundary_degree) = (meta.degree, meta.boundary_degree);
         return Err(ExportError::Degree { degree, boundary_degree });
     }
@@ -243,7 +243,7 @@ mod tests {
         };
         assert!(refused(&|p| p.face[2][1] = 999).contains("face 2"));
         assert!(refused(&|p| p.edge_of[5] = 999).contains("half-edge 5"));
-        assert!(refused(&|p| p.meta[0].degree = 6).contains("degree 6"));
+        assert!(refused(&|p| p.meta[0].degree = 5).contains("degree 5"));
         assert!(refused(&|p| p.interior.clear()).contains("inner points"));
     }
 

@@ -10,6 +10,7 @@ pub mod normal_curve;
 pub mod paper_curve;
 pub mod patch_fit;
 pub mod projection;
+pub mod sextic_edge;
 pub mod shape;
 pub mod start;
 pub mod vertex_star;

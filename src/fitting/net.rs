@@ -1,11 +1,12 @@
 //! Nets of faces put together from the rows of several stages.
 
 use isospline_artifact::kinds::{BaseMeshView, NetworkView};
-use isospline_geometry::Vec3;
-use isospline_geometry::bezier_curve::raise_quartic_to_septic;
+use crate::edge_end::outgoing_curve;
+use isospline_geometry::bezier_curve::{raise_quartic_to_septic, raise_quartic_to_sextic};
 use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, interior_indices,
+    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, interior_indices, n_control,
 };
+use isospline_geometry::{HalfEdge, Vec3};
 use std::ops::Range;
 
 /// The net of `face` with its boundary raised from the edges' quartics, zero inside.
@@ -17,21 +18,46 @@ pub fn boundary_net(
     face: usize,
 ) -> [Vec3; N_CONTROL] {
     let mut net = [Vec3::zeros(); N_CONTROL];
-    for corner in 0..3 {
-        let h = 3 * face + corner;
-        let e = mesh.edge_of[h] as usize;
-        let [a, b] = mesh.edge[e].map(|v| Vec3::from(mesh.position[v as usize]));
-        let c = &network.control[e];
-        let inner = |k: usize| Vec3::new(c[3 * k], c[3 * k + 1], c[3 * k + 2]);
-        let mut curve = raise_quartic_to_septic(&[a, inner(0), inner(1), inner(2), b]);
-        if mesh.edge_half[e][0] as usize != h {
-            curve.reverse();
-        }
-        for (s, p) in curve.into_iter().enumerate() {
+    for (corner, curve) in curves(mesh, network, face, raise_quartic_to_septic).iter().enumerate() {
+        for (s, &p) in curve.iter().enumerate() {
             net[boundary_index(DEGREE, corner, s)] = p;
         }
     }
     net
+}
+
+/// The same of degree 6.
+pub fn boundary_net_sextic(
+    mesh: &BaseMeshView<'_>,
+    network: &NetworkView<'_>,
+    face: usize,
+) -> [Vec3; n_control(6)] {
+    let mut net = [Vec3::zeros(); n_control(6)];
+    for (corner, curve) in curves(mesh, network, face, raise_quartic_to_sextic).iter().enumerate() {
+        for (s, &p) in curve.iter().enumerate() {
+            net[boundary_index(6, corner, s)] = p;
+        }
+    }
+    net
+}
+
+/// The raised curves of a face, counter-clockwise.
+fn curves<const N: usize>(
+    mesh: &BaseMeshView<'_>,
+    network: &NetworkView<'_>,
+    face: usize,
+    raise: impl Fn(&[Vec3; 5]) -> [Vec3; N],
+) -> [[Vec3; N]; 3] {
+    [0, 1, 2].map(|corner| {
+        let h = 3 * face + corner;
+        let e = mesh.edge_of[h] as usize;
+        let lower = HalfEdge(mesh.edge_half[e][0]);
+        let mut curve = raise(&outgoing_curve(mesh, network, lower));
+        if lower.row() != h {
+            curve.reverse();
+        }
+        curve
+    })
 }
 
 /// Edges of `faces`, with repetitions.

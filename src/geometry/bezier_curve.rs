@@ -42,6 +42,20 @@ pub fn raise_quartic_to_septic(q: &[Vec3; 5]) -> [Vec3; 8] {
     ]
 }
 
+/// Raises a quartic to degree 6; the note of [`raise_quartic_to_septic`] holds here too.
+#[inline]
+pub fn raise_quartic_to_sextic(q: &[Vec3; 5]) -> [Vec3; 7] {
+    [
+        q[0],
+        (q[0] + 2.0 * q[1]) / 3.0,
+        (q[0] + q[1] * 8.0 + q[2] * 6.0) / 15.0,
+        (q[1] + q[2] * 3.0 + q[3]) / 5.0,
+        (q[2] * 6.0 + q[3] * 8.0 + q[4]) / 15.0,
+        (2.0 * q[3] + q[4]) / 3.0,
+        q[4],
+    ]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -55,9 +69,10 @@ mod tests {
             Vec3::new(3.0, 0.5, 0.25),
             Vec3::new(4.0, 0.0, 1.0),
         ];
-        let c = raise_quartic_to_septic(&q);
+        let (sextic, septic) = (raise_quartic_to_sextic(&q), raise_quartic_to_septic(&q));
         for t in [0.0, 0.125, 0.3, 0.5, 0.77, 1.0] {
-            assert!((evaluate(&q, t) - evaluate(&c, t)).norm() < 1e-14);
+            assert!((evaluate(&q, t) - evaluate(&sextic, t)).norm() < 1e-14);
+            assert!((evaluate(&q, t) - evaluate(&septic, t)).norm() < 1e-14);
         }
     }
 

@@ -25,7 +25,7 @@ impl<'a> Surface<'a> {
     /// [`RenderError::Degree`], [`RenderError::Incoherent`], [`RenderError::Empty`].
     pub fn from_patches(patches: &PatchesView<'a>) -> Result<Self, RenderError> {
         let meta = patches.meta.first().copied().unwrap_or_default();
-        if (meta.degree, meta.boundary_degree, meta.rational) != (DEGREE as u32, 4, 0) {
+        if !meta.is_known() {
             let (degree, boundary_degree) = (meta.degree, meta.boundary_degree);
             return Err(RenderError::Degree { degree, boundary_degree });
         }

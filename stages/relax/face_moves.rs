@@ -69,7 +69,7 @@ pub(crate) struct FaceMoves {
 
 /// Which of the face's moves is number `c` of those that reach the row beside edge `k`.
 #[inline]
-const fn column(k: usize, c: usize) -> usize {
+pub(crate) const fn column(k: usize, c: usize) -> usize {
     if c < OWN {
         OWN * k + c
     } else if c < OWN + 3 {

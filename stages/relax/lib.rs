@@ -4,6 +4,7 @@
 //! tile by tile with the rest fixed. Nothing is traded for the error: every surface on the way is
 //! G1 and watertight.
 
+mod degree;
 mod element;
 mod envelope;
 mod error;
@@ -16,6 +17,8 @@ mod progress;
 mod restore;
 mod roughness;
 mod samples;
+mod sextic;
+mod ties;
 mod tile_solve;
 mod tiling;
 
@@ -23,13 +26,14 @@ pub use error::RelaxError;
 pub use params::RelaxParams;
 
 use isospline_artifact::kinds::{
-    BaseMeshView, CurvatureView, EdgeSystemsView, NetworkView, Patches, PatchesView,
+    BaseMeshView, CurvatureView, EdgeSystemsView, NetworkView, PatchMeta, Patches, PatchesView,
     VertexSystemsView,
 };
 use isospline_fitting::net::point;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task, map};
+use degree::Degree;
 use moves::Moves;
-use progress::{Progress, TileState};
+use progress::{Progress, Start, TileState};
 use restore::Conditions;
 use samples::{Interior, Samples};
 use tile_solve::Problem;
@@ -52,7 +56,7 @@ pub struct Relax {
 
 impl Stage for Relax {
     const NAME: &'static str = "relax";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
     type Params = RelaxParams;
     type Whole<'a> = (
         BaseMeshView<'a>,
@@ -81,30 +85,44 @@ impl Stage for Relax {
         (): (),
         _: &Task,
     ) -> Result<Piece<Patches>, RelaxError> {
+        let degree = self.params.degree();
         let tiling = Tiling::new(&mesh, self.params.tile as usize);
-        let mut at = Progress::new(
-            patches.interior.iter().map(interior).collect(),
-            edges.weights.iter().map(|w| w.nu).collect(),
-            tiling.tiles.len(),
-        );
-        let samples = Samples::new(self.params.grid, self.params.smoothness);
-        let moves = Moves::new(ctx.host, &mesh, &network, &vertices);
-        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field: ctx.field };
+        let samples = Samples::new(self.params.grid, self.params.smoothness, degree);
+        let moves = Moves::new(ctx.host, &mesh, &network, &vertices, degree);
+        let conditions = Conditions { mesh, curvature, network, vertices };
+        let start = match degree {
+            Degree::Six => conditions.lowered(ctx.host, &moves, &samples, patches.interior),
+            Degree::Seven => Start {
+                interior: patches.interior.iter().map(interior).collect(),
+                nu: edges.weights.iter().map(|w| w.nu).collect(),
+                gap: Vec::new(),
+            },
+        };
+        let mut at = Progress::new(start, tiling.tiles.len());
+        let field = ctx.field;
+        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field, degree };
         self.sweep(ctx, &problem, &tiling, &mut at)?;
         let mut counters = Counters::default();
         counters.count("tiles", tiling.tiles.len() as u64);
         counters.count("visits", at.visits);
         counters.count("visits_without_step", at.idle_visits);
-        let conditions = Conditions { mesh, curvature, network, vertices };
-        let restored = conditions.restore(ctx.host, &mut at.interior, &at.nu);
+        let (surface, nu) = (&mut at.interior, &mut at.nu);
+        let restored = match degree {
+            Degree::Six => conditions.restore_sextic(ctx.host, &moves, surface, nu),
+            Degree::Seven => conditions.restore(ctx.host, surface, nu),
+        };
         counters.merge(&restored);
+        let row = |f: usize| match degree {
+            Degree::Six => conditions.raised(&at.interior[f], f),
+            Degree::Seven => flat(&at.interior[f]),
+        };
         let rows = Patches {
-            meta: patches.meta.to_vec(),
+            meta: vec![PatchMeta { degree: degree.number() as u32, ..patches.meta[0] }],
             position: patches.position.to_vec(),
             face: patches.face.to_vec(),
             edge_of: patches.edge_of.to_vec(),
             boundary: patches.boundary.to_vec(),
-            interior: at.interior.iter().map(flat).collect(),
+            interior: map(ctx.host, at.interior.len(), row),
         };
         Ok(Piece { rows, counters })
     }
@@ -162,7 +180,7 @@ fn visit(
         // Surfaces of the stages before may be folded where no sample sees it; the first steps
         // unfold them.
         let goal = if state.steps < FIRST_STEPS { 0.0 } else { goal };
-        problem.visit(tile, &at.interior, state.damping, goal)
+        problem.visit(tile, at, state.damping, goal)
     });
     for (&t, outcome) in batch.iter().zip(outcomes) {
         // Its neighbours may move what it shares with them: one that is near is looked at again

@@ -14,12 +14,20 @@
 //!
 //! The rows of the edges i - 1, i, i + 1 follow by least norm, so a spoke's move reaches the four
 //! faces about them and no other.
+//!
+//! *Degree 6* [derived]. The same moves of spokes; of the rows beside an edge one combination is
+//! free, three moves in place of six; and `mu1` of both ends and `nu` are tied by one equation an
+//! edge (src/fitting/sextic_edge.rs), so that 13 moves a face remain of 14.5. Moves of single
+//! spokes do not keep the ties.
 //
 // symbols: q control points of a curve, p and r first inner rows left and right of an edge
 
+use crate::degree::Degree;
+use crate::ties::Tie;
 use isospline_artifact::kinds::{BaseMeshView, NetworkView, VertexSystemsView};
 use isospline_fitting::edge_end::{ccw, cw, outgoing_curve, outgoing_tangent};
 use isospline_fitting::edge_system::{Points, System, nu_column};
+use isospline_fitting::sextic_edge::{self, SexticSystem, fourth_difference, free_combination};
 use isospline_geometry::{HalfEdge, Vec3};
 use isospline_stage::Host;
 use isospline_stage::host::map;
@@ -39,10 +47,10 @@ pub(crate) struct Spoke {
     tangent: Vec3,
 }
 
-/// Moves of p2, r2, p3, r3, p4, r4.
+/// Moves of p2, r2, p3, r3, p4, r4; of degree 6, of p2, r2, nothing, p3, r3.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EdgeMoves {
-    /// Two orthonormal combinations, each in three directions.
+    /// Two orthonormal combinations, each in three directions; of degree 6 one.
     pub(crate) free: [[f64; 6]; 2],
     /// The move of `nu`.
     pub(crate) nu: Points,
@@ -59,6 +67,8 @@ pub(crate) struct Moves {
     pub(crate) spokes: Vec<Spoke>,
     /// By edge.
     pub(crate) edges: Vec<EdgeMoves>,
+    /// By edge of patches of degree 6, else empty.
+    pub(crate) ties: Vec<Tie>,
 }
 
 impl Moves {
@@ -67,19 +77,32 @@ impl Moves {
         mesh: &BaseMeshView<'_>,
         network: &NetworkView<'_>,
         vertices: &VertexSystemsView<'_>,
+        degree: Degree,
     ) -> Self {
         let lambda0 = |h: HalfEdge| vertices.weights[mesh.star_row[h.row()] as usize][0];
         let spokes: Vec<Spoke> = map(host, mesh.opposite.len(), |h| {
             let h = HalfEdge(h as u32);
             Spoke::new(mesh, network, lambda0(h), h)
         });
-        let edges = map(host, mesh.edge.len(), |e| {
+        let edge = |e: usize| {
             let halves = mesh.edge_half[e].map(HalfEdge);
+            let q = outgoing_curve(mesh, network, halves[0]);
             let lambda = [lambda0(halves[0]), 1.0 - lambda0(halves[1])];
-            let ends = halves.map(|h| TwistMoves::about(mesh, &spokes, h));
-            EdgeMoves::new(&outgoing_curve(mesh, network, halves[0]), lambda, &ends)
-        });
-        Self { spokes, edges }
+            let ends = halves.map(|h| TwistMoves::about(mesh, &spokes, h, degree));
+            (q, lambda, ends)
+        };
+        let n_edges = mesh.edge.len();
+        let (edges, ties) = match degree {
+            Degree::Seven => {
+                let septic = |(q, lambda, ends)| EdgeMoves::septic(&q, lambda, &ends);
+                (map(host, n_edges, |e| septic(edge(e))), Vec::new())
+            }
+            Degree::Six => {
+                let sextic = |(q, lambda, ends)| EdgeMoves::sextic(&q, lambda, &ends);
+                map(host, n_edges, |e| sextic(edge(e))).into_iter().unzip()
+            }
+        };
+        Self { spokes, edges, ties }
     }
 }
 
@@ -99,10 +122,14 @@ impl Spoke {
     }
 
     /// Change of `mu1` when the twists left and right of the spoke move: the component of row
-    /// k = 1 along the spoke.
-    fn mu1(&self, left: &Vec3, right: &Vec3) -> f64 {
+    /// k = 1 along the spoke, `6 (..) = 4 mu1 (q1 - q0) + ..`, of degree 6 `5 (..) = 3 mu1 ..`.
+    fn mu1(&self, left: &Vec3, right: &Vec3, degree: Degree) -> f64 {
+        let factor = match degree {
+            Degree::Six => 5.0 / 3.0,
+            Degree::Seven => 6.0 / 4.0,
+        };
         let mixed = (1.0 - self.lambda0) * left + self.lambda0 * right;
-        1.5 * self.tangent.dot(&mixed) / self.tangent.norm_squared()
+        factor * self.tangent.dot(&mixed) / self.tangent.norm_squared()
     }
 }
 
@@ -110,31 +137,57 @@ impl Spoke {
 struct TwistMoves([(Vec3, Vec3, f64); 3]);
 
 impl TwistMoves {
-    fn about(mesh: &BaseMeshView<'_>, spokes: &[Spoke], h: HalfEdge) -> Self {
+    fn about(mesh: &BaseMeshView<'_>, spokes: &[Spoke], h: HalfEdge, degree: Degree) -> Self {
         let own = &spokes[h.row()];
         let (before, after) = (&spokes[cw(mesh, h).row()], &spokes[ccw(mesh, h).row()]);
         let shifts =
             [(Vec3::zeros(), before.left), (own.left, own.right), (after.right, Vec3::zeros())];
-        Self(shifts.map(|(left, right)| (left, right, own.mu1(&left, &right))))
+        Self(shifts.map(|(left, right)| (left, right, own.mu1(&left, &right, degree))))
     }
 }
 
 impl EdgeMoves {
-    fn new(q: &[Vec3; 5], lambda: [f64; 2], [lower, higher]: &[TwistMoves; 2]) -> Self {
+    fn septic(q: &[Vec3; 5], lambda: [f64; 2], [lower, higher]: &[TwistMoves; 2]) -> Self {
         let system = System::new(lambda);
-        let along_nu = system.least_norm(&nu_column(q, lambda));
-        let size_sq = along_nu.iter().map(Vec3::norm_squared).sum::<f64>();
-        let nu_scale = 1.0 / (size_sq + LEAST_NU * (q[4] - q[0]).norm_squared()).sqrt();
+        let along_nu = system.least_norm(&nu_column(q, lambda).map(|x| -x));
         // Both directions read the twists from their own end; the right one runs backwards.
         let at_lower = |(p1, r1, mu1)| system.least_norm(&lower_end(q, lambda[1], p1, r1, mu1));
         let at_higher = |(r5, p5, mu1)| system.least_norm(&higher_end(q, p5, r5, mu1));
-        Self {
-            free: free_combinations(&system),
-            nu: along_nu.map(|x| -nu_scale * x),
-            ends: [lower.0.map(at_lower), higher.0.map(at_higher)],
-            nu_scale,
-        }
+        let ends = [lower.0.map(at_lower), higher.0.map(at_higher)];
+        let nu_scale = nu_scale(&along_nu, q);
+        let nu = along_nu.map(|x| nu_scale * x);
+        Self { free: free_combinations(&system), nu, ends, nu_scale }
     }
+
+    fn sextic(q: &[Vec3; 5], lambda: [f64; 2], [lower, higher]: &[TwistMoves; 2]) -> (Self, Tie) {
+        let system = SexticSystem::new(lambda);
+        let moved = |rhs: [Vec3; 3]| slots(system.least_norm(&rhs), Vec3::zeros());
+        let at_lower = |(p1, r1, mu1)| moved(sextic_edge::lower_end(q, lambda[1], p1, r1, mu1));
+        let at_higher = |(r4, p4, mu1)| moved(sextic_edge::higher_end(q, lambda[0], p4, r4, mu1));
+        let ends = [lower.0.map(at_lower), higher.0.map(at_higher)];
+        let along_nu = moved([Vec3::zeros(), Vec3::zeros(), fourth_difference(q)]);
+        let nu_scale = nu_scale(&along_nu, q);
+        let nu = along_nu.map(|x| nu_scale * x);
+        let free = [slots(free_combination(lambda), 0.0), [0.0; 6]];
+        // mu2 of the edge falls when mu1 of the higher end grows, so both ends count alike.
+        let tie = Tie {
+            ends: [lower, higher].map(|end| end.0.map(|(_, _, mu1)| 3.0 * mu1)),
+            nu: (lambda[0] - lambda[1]) * nu_scale,
+            chord_sq: (q[4] - q[0]).norm_squared(),
+        };
+        (Self { free, nu, ends, nu_scale }, tie)
+    }
+}
+
+/// What is given of p2, r2, p3, r3 of degree 6, in the slots of a septic row.
+fn slots<T: Copy>([p2, r2, p3, r3]: [T; 4], zero: T) -> [T; 6] {
+    [p2, r2, zero, zero, p3, r3]
+}
+
+/// The amount of `nu` whose move shifts the points by a unit of length together.
+fn nu_scale(along_nu: &Points, q: &[Vec3; 5]) -> f64 {
+    let size_sq = along_nu.iter().map(Vec3::norm_squared).sum::<f64>();
+    1.0 / (size_sq + LEAST_NU * (q[4] - q[0]).norm_squared()).sqrt()
 }
 
 /// Change of the right sides of an edge system when p1, r1 and `mu1` of the lower end change

@@ -1,5 +1,6 @@
 //! Numbers of a tile's unknowns.
 
+use crate::degree::Degree;
 use crate::face_moves::{OWN, REACHING, reaching_spokes};
 use crate::tiling::Tile;
 use isospline_artifact::kinds::BaseMeshView;
@@ -18,13 +19,14 @@ pub(crate) struct Numbering {
 }
 
 impl Numbering {
-    pub(crate) fn new(mesh: &BaseMeshView<'_>, tile: &Tile) -> Self {
+    pub(crate) fn new(mesh: &BaseMeshView<'_>, tile: &Tile, degree: Degree) -> Self {
+        let own = own_moves(degree);
         let mut first_of_edge = Vec::with_capacity(tile.edges.len());
         let mut of_spoke = vec![0; tile.spokes.len()];
         let mut n = 0;
         for &e in &tile.edges {
             first_of_edge.push(n);
-            n += OWN;
+            n += own.len();
             for h in mesh.edge_half[e as usize] {
                 if let Ok(at) = tile.spokes.binary_search(&h) {
                     of_spoke[at] = n as u32;
@@ -35,10 +37,18 @@ impl Numbering {
         let columns: Vec<_> = tile
             .faces
             .iter()
-            .map(|&f| columns(mesh, tile, f as usize, &first_of_edge, &of_spoke))
+            .map(|&f| columns(mesh, tile, f as usize, own, &first_of_edge, &of_spoke))
             .collect();
-        let nu = first_of_edge.iter().map(|first| first + OWN - 1).collect();
+        let nu = first_of_edge.iter().map(|first| first + own.len() - 1).collect();
         Self { lowest: lowest(n, &columns), columns, nu }
+    }
+}
+
+/// An edge's own moves that there are; the last is that of `nu`.
+const fn own_moves(degree: Degree) -> &'static [usize] {
+    match degree {
+        Degree::Six => &[0, 1, 2, 6],
+        Degree::Seven => &[0, 1, 2, 3, 4, 5, 6],
     }
 }
 
@@ -46,14 +56,15 @@ fn columns(
     mesh: &BaseMeshView<'_>,
     tile: &Tile,
     face: usize,
+    own: &[usize],
     first_of_edge: &[usize],
     of_spoke: &[u32],
 ) -> [Option<u32>; REACHING] {
     let mut out = [None; REACHING];
     for k in 0..3 {
         if let Ok(at) = tile.edges.binary_search(&mesh.edge_of[3 * face + k]) {
-            for c in 0..OWN {
-                out[OWN * k + c] = Some((first_of_edge[at] + c) as u32);
+            for (i, c) in own.iter().enumerate() {
+                out[OWN * k + c] = Some((first_of_edge[at] + i) as u32);
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Parameters of the relaxation.
 
+use crate::degree::Degree;
 use isospline_stage::Params;
 
 /// The `[relax]` table.
@@ -23,11 +24,19 @@ pub struct RelaxParams {
     /// squared distance: a Sobolev term; 0 to 1, default 0. 0.3 halves jumps of curvature and
     /// costs half as much time again; 1 keeps sweeps from coming to an end.
     pub smoothness: f64,
+    /// Degree of the patches, 6 or 7, default 7. Degree 6 has 28 control points in place of 36.
+    pub degree: u32,
+}
+
+impl RelaxParams {
+    pub(crate) fn degree(&self) -> Degree {
+        if self.degree == 6 { Degree::Six } else { Degree::Seven }
+    }
 }
 
 impl Default for RelaxParams {
     fn default() -> Self {
-        Self { sweeps: 18, tile: 2, grid: 12, goal: 0.0, smoothness: 0.0 }
+        Self { sweeps: 18, tile: 2, grid: 12, goal: 0.0, smoothness: 0.0, degree: 7 }
     }
 }
 
@@ -37,6 +46,7 @@ impl Params for RelaxParams {
             ("sweeps", self.sweeps, 0, 100),
             ("tile", self.tile, 1, 6),
             ("grid", self.grid, 9, 32),
+            ("degree", self.degree, 6, 7),
         ];
         for (key, value) in [("goal", self.goal), ("smoothness", self.smoothness)] {
             if !(0.0..=1.0).contains(&value) {

@@ -18,8 +18,21 @@ pub(crate) struct Progress {
     pub(crate) tiles: Vec<TileState>,
     /// The free scalar of each edge.
     pub(crate) nu: Vec<f64>,
+    /// By how much each edge between patches of degree 6 misses the tie of its ends, else empty.
+    pub(crate) gap: Vec<f64>,
     /// By face.
     pub(crate) interior: Vec<Interior>,
+}
+
+/// A surface to begin with.
+#[derive(Clone, Debug)]
+pub(crate) struct Start {
+    /// By face.
+    pub(crate) interior: Vec<Interior>,
+    /// The free scalar of each edge.
+    pub(crate) nu: Vec<f64>,
+    /// By how much each edge between patches of degree 6 misses the tie of its ends, else empty.
+    pub(crate) gap: Vec<f64>,
 }
 
 /// What a tile carries from visit to visit.
@@ -41,9 +54,10 @@ const INTERIOR: usize = 45;
 
 impl Progress {
     /// No colour visited yet.
-    pub(crate) fn new(interior: Vec<Interior>, nu: Vec<f64>, n_tiles: usize) -> Self {
+    pub(crate) fn new(start: Start, n_tiles: usize) -> Self {
+        let Start { interior, nu, gap } = start;
         let tiles = vec![TileState { damping: FIRST_DAMPING, rest: 0, steps: 0 }; n_tiles];
-        Self { colours: 0, visits: 0, idle_visits: 0, tiles, nu, interior }
+        Self { colours: 0, visits: 0, idle_visits: 0, tiles, nu, gap, interior }
     }
 
     /// Moves the surface by what came of a visit.
@@ -56,15 +70,18 @@ impl Progress {
         for (&e, change) in tile.edges.iter().zip(&outcome.nu) {
             self.nu[e as usize] += change;
         }
+        for (&e, change) in tile.edges.iter().zip(&outcome.gap) {
+            self.gap[e as usize] += change;
+        }
     }
 
-    /// Little-endian words: counts, damping, rest and steps of each tile, `nu`, interiors.
+    /// Little-endian words: counts, damping, rest and steps of each tile, `nu`, gaps, interiors.
     pub(crate) fn encode(&self) -> Vec<u8> {
         let counts = [self.colours, self.visits, self.idle_visits];
         let words = |t: &TileState| [t.damping.to_bits(), t.rest.into(), t.steps.into()];
         let tiles = self.tiles.iter().flat_map(words);
         let points = self.interior.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
-        let reals = self.nu.iter().copied().chain(points).map(f64::to_bits);
+        let reals = self.nu.iter().chain(&self.gap).copied().chain(points).map(f64::to_bits);
         counts.into_iter().chain(tiles).chain(reals).flat_map(u64::to_le_bytes).collect()
     }
 
@@ -75,7 +92,8 @@ impl Progress {
         let words: Vec<u64> = words.iter().map(|w| u64::from_le_bytes(*w)).collect();
         let (counts, rest) = words.split_at_checked(COUNTS)?;
         let (tiles, rest) = rest.split_at_checked(TILE * self.tiles.len())?;
-        let (nu, points) = rest.split_at_checked(self.nu.len())?;
+        let (nu, rest) = rest.split_at_checked(self.nu.len())?;
+        let (gap, points) = rest.split_at_checked(self.gap.len())?;
         if points.len() != INTERIOR * self.interior.len() {
             return None;
         }
@@ -95,6 +113,7 @@ impl Progress {
             idle_visits: counts[2],
             tiles: tiles.as_chunks().0.iter().map(tile).collect::<Option<_>>()?,
             nu: nu.iter().map(real).collect(),
+            gap: gap.iter().map(real).collect(),
             interior: points.as_chunks().0.iter().map(interior).collect(),
         })
     }
@@ -106,7 +125,9 @@ mod tests {
 
     fn progress(n_tiles: usize) -> Progress {
         let interior = |f: usize| std::array::from_fn(|i| Vec3::new(f as f64, i as f64, -0.1));
-        let mut progress = Progress::new((0..4).map(interior).collect(), vec![0.25; 6], n_tiles);
+        let interior = (0..4).map(interior).collect();
+        let start = Start { interior, nu: vec![0.25; 6], gap: vec![1e-9; 6] };
+        let mut progress = Progress::new(start, n_tiles);
         progress.tiles[1] = TileState { damping: 1e-9, rest: 2, steps: 1 };
         Progress { colours: 5, visits: 9, idle_visits: 1, ..progress }
     }
@@ -114,7 +135,8 @@ mod tests {
     #[test]
     fn progress_comes_back_from_its_bytes_and_from_no_others() {
         let (at, bytes) = (progress(3), progress(3).encode());
-        let new = Progress::new(at.interior.clone(), vec![0.0; 6], 3);
+        let start = Start { interior: at.interior.clone(), nu: vec![0.0; 6], gap: vec![0.0; 6] };
+        let new = Progress::new(start, 3);
         assert_eq!(new.decode(&bytes), Some(at));
         assert_eq!(progress(2).decode(&bytes), None, "another tiling");
         for length in 0..bytes.len() {

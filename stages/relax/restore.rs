@@ -35,7 +35,8 @@ impl Conditions<'_> {
         nu: &[f64],
     ) -> Counters {
         let mut counters = Counters::default();
-        let stars = map(host, self.mesh.position.len(), |v| self.vertex(surface, v));
+        let twist = |h: HalfEdge| row_point(surface, h, 1);
+        let stars = map(host, self.mesh.position.len(), |v| self.vertex(&twist, v));
         let mut weights = self.vertices.weights.to_vec();
         for (v, star) in stars.into_iter().enumerate() {
             // Twists without a solution stay where the moves, exact up to rounding, left them.
@@ -67,8 +68,13 @@ impl Conditions<'_> {
         counters
     }
 
-    fn vertex(&self, surface: &[Interior], vertex: usize) -> Option<RestoredStar> {
-        let twist = |h: HalfEdge| row_point(surface, h, 1);
+    /// The twists of a vertex moved least onto its rows; `twist` is that of the face of an outgoing
+    /// half-edge, of degree 7, in model units.
+    pub(crate) fn vertex(
+        &self,
+        twist: &impl Fn(HalfEdge) -> Vec3,
+        vertex: usize,
+    ) -> Option<RestoredStar> {
         let star = Star::new(&self.mesh, &self.curvature, &self.network, twist, vertex);
         let mut solver = Solver::default();
         solver.solve(&star)?;
@@ -90,10 +96,10 @@ impl Conditions<'_> {
 }
 
 /// Twists and `mu1` of a vertex, counter-clockwise.
-struct RestoredStar {
-    twists: Vec<Vec3>,
-    mu1: Vec<f64>,
-    residual: f64,
+pub(crate) struct RestoredStar {
+    pub(crate) twists: Vec<Vec3>,
+    pub(crate) mu1: Vec<f64>,
+    pub(crate) residual: f64,
 }
 
 /// First inner rows of an edge.

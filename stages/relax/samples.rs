@@ -1,10 +1,11 @@
 //! The sample grid of a patch and the Bernstein values of its control points there.
 
+use crate::degree::Degree;
 use crate::functionals::{Functionals, LANES, Values};
 use crate::roughness::Roughness;
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, bernstein, exponents, grid, index, interior_indices,
+    N_CONTROL, N_INTERIOR, bernstein, exponents, grid, index, interior_indices,
 };
 use isospline_geometry::linear::{cholesky, cholesky_solve};
 
@@ -39,21 +40,22 @@ pub(crate) struct Samples {
 impl Samples {
     /// The inner points of a grid with `steps` steps a side; `smoothness` weighs squared differences
     /// of the distance between them.
-    pub(crate) fn new(steps: u32, smoothness: f64) -> Self {
+    pub(crate) fn new(steps: u32, smoothness: f64, degree: Degree) -> Self {
         let places: Vec<[f64; 3]> = grid(steps as usize).collect();
         let is_inner = |p: &&[f64; 3]| p.iter().all(|&x| x > 0.0);
         let is_rim = |p: &&[f64; 3]| p.contains(&0.0) && p.iter().all(|&x| x < 1.0);
-        let values = |&p: &[f64; 3]| bernstein(DEGREE, p).try_into().expect("invariant: 36 values");
+        let values = |&p: &[f64; 3]| degree.bernstein(p);
         let full: Vec<[f64; N_CONTROL]> = places.iter().filter(is_inner).map(values).collect();
         let interior = interior_indices();
         let inner: Vec<_> = full.iter().map(|row| interior.map(|i| row[i])).collect();
         let tested = places.iter().filter(is_inner).step_by(FOLD_STRIDE);
-        let tangents = tested.chain(places.iter().filter(is_rim)).flat_map(tangent_weights);
+        let tested = tested.chain(places.iter().filter(is_rim));
+        let tangents = tested.flat_map(|at| tangent_weights(degree, at));
         let functionals = full.iter().copied().chain(tangents).collect::<Vec<_>>();
         let rim = places.iter().filter(is_rim).map(values).collect();
         let roughness = Roughness::new(steps, smoothness);
         let (pairs, functionals) = (pairs(&inner), Functionals::new(&functionals));
-        Self { inner, pairs, roughness, functionals, rim, even: even() }
+        Self { inner, pairs, roughness, functionals, rim, even: even(degree) }
     }
 
     /// Samples of a patch.
@@ -126,22 +128,23 @@ fn pairs(inner: &[[f64; N_INTERIOR]]) -> Vec<Vec<[f64; LANES]>> {
 }
 
 /// The interior points of a net, each the mean of its six neighbours, from the boundary points.
-fn even() -> [[f64; N_CONTROL]; N_INTERIOR] {
-    let all: Vec<[usize; 3]> = exponents(DEGREE).collect();
-    let interior = interior_indices();
-    let slot = |i: usize| interior.iter().position(|&at| at == i);
+/// Slots without a point are zero.
+fn even(degree: Degree) -> [[f64; N_CONTROL]; N_INTERIOR] {
+    let (interior, slots) = (interior_indices(), degree.slots());
+    let inner = |slot: usize| interior.iter().position(|&at| at == slot);
     let mut matrix = [[0.0; N_INTERIOR]; N_INTERIOR];
+    (0..N_INTERIOR).for_each(|i| matrix[i][i] = 6.0);
     let mut weights = [[0.0; N_CONTROL]; N_INTERIOR];
-    for (row, &i) in interior.iter().enumerate() {
-        matrix[row][row] = 6.0;
+    for (e, &slot) in exponents(degree.number()).zip(&slots) {
+        let Some(row) = inner(slot) else { continue };
         for (from, to) in [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)] {
-            let mut neighbour = all[i];
+            let mut neighbour = e;
             neighbour[from] -= 1;
             neighbour[to] += 1;
-            let j = index(neighbour);
-            match slot(j) {
+            let at = slots[index(neighbour)];
+            match inner(at) {
                 Some(column) => matrix[row][column] = -1.0,
-                None => weights[row][j] += 1.0,
+                None => weights[row][at] += 1.0,
             }
         }
     }
@@ -151,10 +154,10 @@ fn even() -> [[f64; N_CONTROL]; N_INTERIOR] {
 }
 
 /// Derivatives towards corner 1 and corner 2, away from corner 0.
-fn tangent_weights(at: &[f64; 3]) -> [[f64; N_CONTROL]; 2] {
-    let lower = bernstein(DEGREE - 1, *at);
+fn tangent_weights(degree: Degree, at: &[f64; 3]) -> [[f64; N_CONTROL]; 2] {
+    let lower = bernstein(degree.number() - 1, *at);
     let mut out = [[0.0; N_CONTROL]; 2];
-    for e in exponents(DEGREE) {
+    for (e, slot) in exponents(degree.number()).zip(degree.slots()) {
         let partial = |k: usize| {
             let mut below = e;
             below[k] = below[k].checked_sub(1)?;
@@ -162,7 +165,7 @@ fn tangent_weights(at: &[f64; 3]) -> [[f64; N_CONTROL]; 2] {
         };
         let from = partial(0).unwrap_or(0.0);
         for k in 0..2 {
-            out[k][index(e)] = partial(k + 1).unwrap_or(0.0) - from;
+            out[k][slot] = partial(k + 1).unwrap_or(0.0) - from;
         }
     }
     out
@@ -172,32 +175,40 @@ fn tangent_weights(at: &[f64; 3]) -> [[f64; N_CONTROL]; 2] {
 mod tests {
     use super::*;
 
-    fn flat_net() -> [Vec3; N_CONTROL] {
-        let net: Vec<Vec3> = grid(DEGREE).map(|[_, v, w]| Vec3::new(v, w, 0.0)).collect();
-        net.try_into().unwrap()
+    /// A net whose points lie evenly in a plane, by slots.
+    fn flat_net(degree: Degree) -> [Vec3; N_CONTROL] {
+        let mut net = [Vec3::zeros(); N_CONTROL];
+        for ([_, v, w], slot) in grid(degree.number()).zip(degree.slots()) {
+            net[slot] = Vec3::new(v, w, 0.0);
+        }
+        net
     }
 
     #[test]
     fn a_flat_net_is_sampled_at_its_grid_and_seen_upright_from_above_alone() {
-        let samples = Samples::new(12, 0.0);
-        let net = flat_net();
-        let interior = interior_indices().map(|i| net[i]);
-        let values = samples.of(&samples.of_boundary(&net), &interior);
-        let inner = grid(12).filter(|p| p.iter().all(|&x| x > 0.0));
-        for (p, [_, v, w]) in samples.points(&values).zip(inner) {
-            assert!((p - Vec3::new(v, w, 0.0)).norm() < 1e-15);
+        for degree in [Degree::Six, Degree::Seven] {
+            let samples = Samples::new(12, 0.0, degree);
+            let net = flat_net(degree);
+            let interior = interior_indices().map(|i| net[i]);
+            let values = samples.of(&samples.of_boundary(&net), &interior);
+            let inner = grid(12).filter(|p| p.iter().all(|&x| x > 0.0));
+            for (p, [_, v, w]) in samples.points(&values).zip(inner) {
+                assert!((p - Vec3::new(v, w, 0.0)).norm() < 1e-15);
+            }
+            let up = |n: usize, side: f64| vec![side * Vec3::z(); n];
+            let folded = |side| samples.folded(&values, &up(55, side), &up(33, side));
+            assert_eq!([folded(1.0), folded(-1.0)], [[0; 2], [19 + 33; 2]], "{degree:?}");
         }
-        let up = |n: usize, side: f64| vec![side * Vec3::z(); n];
-        let folded = |side| samples.folded(&values, &up(55, side), &up(33, side));
-        assert_eq!([folded(1.0), folded(-1.0)], [[0; 2], [19 + 33; 2]]);
     }
 
     #[test]
     fn an_even_net_over_a_flat_boundary_is_flat_and_evenly_spaced() {
-        let (samples, net) = (Samples::new(12, 0.0), flat_net());
-        let even = samples.even(&net);
-        for (p, i) in even.iter().zip(interior_indices()) {
-            assert!((p - net[i]).norm() < 1e-14, "{p} instead of {}", net[i]);
+        for degree in [Degree::Six, Degree::Seven] {
+            let (samples, net) = (Samples::new(12, 0.0, degree), flat_net(degree));
+            let even = samples.even(&net);
+            for (p, i) in even.iter().zip(interior_indices()) {
+                assert!((p - net[i]).norm() < 1e-14, "{p} instead of {}", net[i]);
+            }
         }
     }
 }

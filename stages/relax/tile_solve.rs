@@ -1,15 +1,17 @@
 //! Gauss-Newton steps of one tile with the rest of the surface fixed.
 
+use crate::degree::Degree;
 use crate::element::{Element, Equations, Pull};
 use crate::envelope::Envelope;
 use crate::face_moves::{FaceMoves, REACHING};
 use crate::functionals::Values;
 use crate::moves::Moves;
 use crate::numbering::Numbering;
+use crate::progress::Progress;
 use crate::samples::{Interior, Samples};
+use crate::ties::TileTie;
 use crate::tiling::Tile;
 use isospline_artifact::kinds::{BaseMeshView, NetworkView};
-use isospline_fitting::net::boundary_net;
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index};
 use isospline_implicit::{Field, Jet1};
@@ -41,6 +43,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) moves: &'a Moves,
     pub(crate) samples: &'a Samples,
     pub(crate) field: &'a dyn Field,
+    pub(crate) degree: Degree,
 }
 
 /// What a visit leaves behind.
@@ -50,6 +53,8 @@ pub(crate) struct Outcome {
     pub(crate) interior: Option<Vec<Interior>>,
     /// Change of `nu` of the tile's edges.
     pub(crate) nu: Vec<f64>,
+    /// Change of the gaps of the tile's ties.
+    pub(crate) gap: Vec<f64>,
     /// Damping of the next visit.
     pub(crate) damping: f64,
     /// Part by which the squared distance fell.
@@ -62,20 +67,21 @@ impl Problem<'_> {
     pub(crate) fn visit(
         &self,
         tile: &Tile,
-        surface: &[Interior],
+        at: &Progress,
         damping: f64,
         goal: f64,
     ) -> Outcome {
-        let interior: Vec<Interior> = tile.faces.iter().map(|&f| surface[f as usize]).collect();
+        let interior: Vec<Interior> = tile.faces.iter().map(|&f| at.interior[f as usize]).collect();
         let faces = self.faces(tile);
         let here = self.measure(&faces, &interior);
         let nu = vec![0.0; tile.edges.len()];
-        let idle = Outcome { interior: None, nu, damping, gain: 0.0 };
+        let idle = Outcome { interior: None, nu, gap: Vec::new(), damping, gain: 0.0 };
         if here.unsound + here.tilted == 0 && here.largest() <= goal {
             return idle;
         }
-        let visit =
-            Visit { numbering: Numbering::new(&self.mesh, tile), tile, faces, interior, here };
+        let numbering = Numbering::new(&self.mesh, tile, self.degree);
+        let ties = TileTie::all(&self.mesh, &self.moves.ties, &at.gap, tile, &numbering);
+        let visit = Visit { numbering, ties, tile, faces, interior, here };
         let unfolded = (visit.here.unsound > 0).then(|| self.unfolded(&visit, damping)).flatten();
         unfolded.unwrap_or_else(|| self.nearer(&visit, idle))
     }
@@ -91,6 +97,7 @@ impl Problem<'_> {
                 if there.is_better_than(here) {
                     outcome.interior = Some(trial);
                     outcome.nu = step.nu;
+                    outcome.gap = step.gap;
                     outcome.damping = (outcome.damping * RELIEF).max(LEAST_DAMPING);
                     outcome.gain = 1.0 - there.cost / here.cost;
                     break;
@@ -113,8 +120,8 @@ impl Problem<'_> {
             let there = self.measure(&visit.faces, &trial);
             let is_nearer = || strength(&self.pulls(visit, &trial, &there)) < strength(&pulls);
             if there.unsound < here.unsound || there.unsound == here.unsound && is_nearer() {
-                let (interior, nu) = (Some(trial), step.nu);
-                return Some(Outcome { interior, nu, damping, gain: 1.0 });
+                let Step { nu, gap, .. } = step;
+                return Some(Outcome { interior: Some(trial), nu, gap, damping, gain: 1.0 });
             }
         }
         None
@@ -180,7 +187,7 @@ impl Problem<'_> {
 
     /// The damped step; `None` where the equations have no finite solution.
     fn step(&self, visit: &Visit<'_>, pulls: &[Option<Pull>], damping: f64) -> Option<Step> {
-        let Visit { tile, faces, numbering, here, .. } = visit;
+        let Visit { tile, faces, numbering, ties, here, .. } = visit;
         let n = self.samples.len();
         let mut elements = vec![Element::zero(); faces.len()];
         for (i, element) in elements.iter_mut().enumerate() {
@@ -191,7 +198,7 @@ impl Problem<'_> {
                 return None;
             }
         }
-        let amounts = solve(numbering, &elements, damping)?;
+        let amounts = solve(numbering, &elements, ties, damping)?;
         let shift = |i: usize| -> Interior {
             let amounts = numbering.columns[i].map(|c| c.map_or(0.0, |c| amounts[c as usize]));
             elements[i].shifts(&faces[i].moves.apply(&amounts))
@@ -203,8 +210,9 @@ impl Problem<'_> {
                 scale * amounts[unknown] * self.moves.edges[e as usize].nu_scale
             });
         let nu: Vec<f64> = nu.collect();
+        let gap = ties.iter().map(|tie| scale * tie.change(&amounts)).collect();
         let is_finite = shifts.iter().flatten().flatten().all(|x| x.is_finite());
-        is_finite.then_some(Step { shifts, scale, nu })
+        is_finite.then_some(Step { shifts, scale, nu, gap })
     }
 }
 
@@ -212,6 +220,7 @@ impl Problem<'_> {
 struct Visit<'a> {
     tile: &'a Tile,
     numbering: Numbering,
+    ties: Vec<TileTie>,
     faces: Vec<Face>,
     interior: Vec<Interior>,
     here: Measured,
@@ -239,7 +248,7 @@ struct Face {
 
 impl Face {
     fn new(problem: &Problem<'_>, face: usize) -> Self {
-        let net = boundary_net(&problem.mesh, &problem.network, face);
+        let net = problem.degree.boundary_net(&problem.mesh, &problem.network, face);
         let corners = [0, 1, 2].map(|corner| net[boundary_index(DEGREE, corner, 0)]);
         let side = |k: usize| (corners[k] - corners[(k + 1) % 3]).norm();
         let size = (side(0) + side(1) + side(2)) / 3.0;
@@ -266,6 +275,7 @@ struct Step {
     shifts: Vec<Interior>,
     scale: f64,
     nu: Vec<f64>,
+    gap: Vec<f64>,
 }
 
 impl Step {
@@ -324,7 +334,12 @@ impl Measured {
 }
 
 /// Amounts of the tile's moves.
-fn solve(numbering: &Numbering, elements: &[Element], damping: f64) -> Option<Vec<f64>> {
+fn solve(
+    numbering: &Numbering,
+    elements: &[Element],
+    ties: &[TileTie],
+    damping: f64,
+) -> Option<Vec<f64>> {
     let n = numbering.lowest.len();
     let mut matrix = Envelope::default();
     matrix.reset(&numbering.lowest);
@@ -338,6 +353,14 @@ fn solve(numbering: &Numbering, elements: &[Element], damping: f64) -> Option<Ve
                 if let Some(column) = column.filter(|c| *c as usize <= row) {
                     matrix.add(row, column as usize, *x);
                 }
+            }
+        }
+    }
+    for tie in ties {
+        for &(row, x) in &tie.terms {
+            amounts[row] -= tie.weight * tie.gap * x;
+            for &(column, y) in tie.terms.iter().filter(|(column, _)| *column <= row) {
+                matrix.add(row, column, tie.weight * x * y);
             }
         }
     }

@@ -27,12 +27,20 @@ impl Scheme {
 pub struct PatchMeta {
     /// Code of the [`Scheme`].
     pub scheme: u32,
-    /// Degree of the patches.
+    /// Degree of the patches, 6 or 7; those of degree 6 are stored raised to degree 7.
     pub degree: u32,
     /// Degree of the boundary curves as stored.
     pub boundary_degree: u32,
     /// 1 if weights are stored.
     pub rational: u32,
+}
+
+impl PatchMeta {
+    /// Whether these are patches as [`PatchesView::net`] gives them: polynomial, of degree 6 or 7, over
+    /// quartic curves.
+    pub fn is_known(&self) -> bool {
+        matches!((self.degree, self.boundary_degree, self.rational), (6 | 7, 4, 0))
+    }
 }
 
 artifact! {

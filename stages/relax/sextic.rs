@@ -1,0 +1,246 @@
+//! Patches of degree 6: from those of degree 7 that the stages before made, back onto the exact
+//! conditions, and raised to degree 7 at the end.
+//!
+//! Twists have the same mixed derivatives in both degrees, `42 (b - ..) = 30 (b' - ..)`, so the
+//! systems of the vertices are shared.
+//
+// symbols: t5 = (4, 1, 1) and t6 = (5, 1, 1), the twists of degree 6 and 7
+
+use crate::degree::{Degree, sextic_step};
+use crate::moves::Moves;
+use crate::progress::Start;
+use crate::restore::Conditions;
+use crate::samples::{Interior, Samples};
+use crate::ties::close;
+use isospline_fitting::edge_end::{ccw, cw, outgoing_curve, outgoing_tangent};
+use isospline_fitting::net::{boundary_net_sextic, point};
+use isospline_fitting::sextic_edge::SexticEdge;
+use isospline_geometry::bezier_triangle::{
+    DEGREE, INNERMOST_SLOTS, N_CONTROL, N_INTERIOR, boundary_index, exponents, first_inner_index, first_inner_slot,
+    index, interior_indices, n_control,
+};
+use isospline_geometry::{HalfEdge, Vec3};
+use isospline_stage::{Counters, Host, map};
+
+/// Gaps, without unit, that are rounding.
+const CLOSED: f64 = 1e-15;
+/// Times that gaps are closed: the second removes what the rounding of the first left.
+const CLOSINGS: usize = 3;
+
+impl Conditions<'_> {
+    /// The exact surface of degree 6 nearest to these septic patches in its twists and rows.
+    pub(crate) fn lowered(
+        &self,
+        host: &dyn Host,
+        moves: &Moves,
+        samples: &Samples,
+        septic: &[[f64; 45]],
+    ) -> Start {
+        let lowered = |f: usize| self.lowered_face(samples, &septic[f], f);
+        let interior = map(host, septic.len(), lowered);
+        let n_edges = self.mesh.edge.len();
+        let mut start = Start { interior, nu: vec![0.0; n_edges], gap: vec![0.0; n_edges] };
+        self.restore_sextic(host, moves, &mut start.interior, &mut start.nu);
+        start
+    }
+
+    fn lowered_face(&self, samples: &Samples, septic: &[f64; 45], face: usize) -> Interior {
+        let net = Degree::Six.boundary_net(&self.mesh, &self.network, face);
+        let mut out = samples.even(&net);
+        let boundary = boundary_net_sextic(&self.mesh, &self.network, face);
+        for corner in 0..3 {
+            let along = |s: usize| boundary[boundary_index(6, corner, s)];
+            let septic = |s: usize| point(septic, first_inner_slot(corner, s));
+            let twist = |s: usize| {
+                let h = HalfEdge::new(face as u32, ((corner + usize::from(s > 1)) % 3) as u32);
+                self.sextic_twist(h, septic(s))
+            };
+            // 7 b(4,2,1) = 4 b'(3,2,1) + 2 b'(4,1,1) + b'(4,2,0), and from the other end.
+            let (first, last) = (twist(1), twist(5));
+            out[first_inner_slot(corner, 1)] = first;
+            out[first_inner_slot(corner, 2)] = (7.0 * septic(2) - 2.0 * first - along(2)) / 4.0;
+            out[first_inner_slot(corner, 4)] = (7.0 * septic(4) - 2.0 * last - along(4)) / 4.0;
+        }
+        out
+    }
+
+    /// Moves twists, `nu` and rows of `surface` least onto the conditions.
+    pub(crate) fn restore_sextic(
+        &self,
+        host: &dyn Host,
+        moves: &Moves,
+        surface: &mut [Interior],
+        nu: &mut [f64],
+    ) -> Counters {
+        let mut counters = Counters::default();
+        let mut weights = self.restore_sextic_twists(host, surface, &mut counters);
+        for _ in 0..CLOSINGS {
+            let gap = map(host, nu.len(), |e| self.sextic_edge(surface, &weights, nu[e], e).gap());
+            if gap.iter().all(|g| g.abs() <= CLOSED) {
+                break;
+            }
+            let amounts = close(&self.mesh, &moves.ties, &gap);
+            self.shift_twists(surface, moves, &amounts.spokes);
+            for (e, amount) in amounts.nu.iter().enumerate() {
+                nu[e] += amount * moves.edges[e].nu_scale;
+            }
+            counters = Counters::default();
+            weights = self.restore_sextic_twists(host, surface, &mut counters);
+        }
+        let edges = map(host, nu.len(), |e| {
+            let mut edge = self.sextic_edge(surface, &weights, nu[e], e);
+            edge.solve();
+            edge
+        });
+        for (e, edge) in edges.into_iter().enumerate() {
+            counters.max("edge_gap_max", edge.gap().abs());
+            counters.max("edge_residual_max", edge.residual());
+            let [h, g] = self.mesh.edge_half[e].map(HalfEdge);
+            let origin = outgoing_curve(&self.mesh, &self.network, h)[0];
+            for (h, row) in [(h, [edge.p[2], edge.p[3]]), (g, [edge.r[3], edge.r[2]])] {
+                for (s, p) in [2, 3].into_iter().zip(row) {
+                    *at_mut(surface, h, s) = origin + p;
+                }
+            }
+        }
+        counters
+    }
+
+    /// Moves the twists least onto the rows k = 1; `[lambda0, mu0, mu1]` of degree 7 in star order.
+    fn restore_sextic_twists(
+        &self,
+        host: &dyn Host,
+        surface: &mut [Interior],
+        counters: &mut Counters,
+    ) -> Vec<[f64; 3]> {
+        let twist = |h: HalfEdge| self.septic_twist(h, at(surface, h, 1));
+        let stars = map(host, self.mesh.position.len(), |v| self.vertex(&twist, v));
+        let mut weights = self.vertices.weights.to_vec();
+        for (v, star) in stars.into_iter().enumerate() {
+            let Some(star) = star else {
+                counters.repair("vertices_not_restored", 1);
+                continue;
+            };
+            counters.max("vertex_residual_max", star.residual);
+            let first = self.mesh.star_first[v] as usize;
+            for (i, (twist, mu1)) in star.twists.into_iter().zip(star.mu1).enumerate() {
+                let h = HalfEdge(self.mesh.star[first + i]);
+                *at_mut(surface, h, 1) = self.sextic_twist(h, twist);
+                weights[first + i][2] = mu1;
+            }
+        }
+        weights
+    }
+
+    fn shift_twists(&self, surface: &mut [Interior], moves: &Moves, amounts: &[f64]) {
+        for (h, &amount) in amounts.iter().enumerate() {
+            let (spoke, h) = (&moves.spokes[h], HalfEdge(h as u32));
+            let right = cw(&self.mesh, h);
+            *at_mut(surface, h, 1) += amount * spoke.left;
+            *at_mut(surface, right, 1) += amount * spoke.right;
+        }
+    }
+
+    fn sextic_edge(
+        &self,
+        surface: &[Interior],
+        weights: &[[f64; 3]],
+        nu: f64,
+        edge: usize,
+    ) -> SexticEdge {
+        let [h, g] = self.mesh.edge_half[edge].map(HalfEdge);
+        let curve = outgoing_curve(&self.mesh, &self.network, h);
+        let row = |h| self.sextic_row(surface, h).map(|p| p - curve[0]);
+        let mut r = row(g);
+        r.reverse();
+        let [lower, higher] = [h, g].map(|h| weights[self.mesh.star_row[h.row()] as usize]);
+        let ([a0, a1], [b0, b1]) = (sextic_mu(lower), sextic_mu(higher));
+        SexticEdge {
+            q: curve.map(|q| q - curve[0]),
+            p: row(h),
+            r,
+            lambda: [lower[0], 1.0 - higher[0]],
+            mu: [a0, a1, 1.0 - b1, 1.0 - b0],
+            nu,
+        }
+    }
+
+    /// First inner row of the face of `h`, along `h`: its ends lie on the neighbouring curves.
+    fn sextic_row(&self, surface: &[Interior], h: HalfEdge) -> [Vec3; 6] {
+        let (mesh, network) = (&self.mesh, &self.network);
+        let on_curve = |h: HalfEdge| {
+            let q = outgoing_curve(mesh, network, h);
+            q[0] + (q[1] - q[0]) * (4.0 / 6.0)
+        };
+        let [p1, p2, p3, p4] = [1, 2, 3, 4].map(|s| at(surface, h, s));
+        [on_curve(ccw(mesh, h)), p1, p2, p3, p4, on_curve(h.next())]
+    }
+
+    /// Twist of degree 7 at the origin of `h` with the mixed derivative of this one of degree 6:
+    /// `7 t6 = 5 t5 + b'(5,1,0) + b'(5,0,1)`.
+    fn septic_twist(&self, h: HalfEdge, sextic: Vec3) -> Vec3 {
+        (5.0 * sextic + self.beside_twist(h)) / 7.0
+    }
+
+    fn sextic_twist(&self, h: HalfEdge, septic: Vec3) -> Vec3 {
+        (7.0 * septic - self.beside_twist(h)) / 5.0
+    }
+
+    fn beside_twist(&self, h: HalfEdge) -> Vec3 {
+        let (mesh, network) = (&self.mesh, &self.network);
+        let origin = outgoing_curve(mesh, network, h)[0];
+        let tangent = |h| outgoing_tangent(mesh, network, h);
+        2.0 * origin + (4.0 / 6.0) * (tangent(h) + tangent(ccw(mesh, h)))
+    }
+
+    /// Interior points of the patch raised to degree 7.
+    pub(crate) fn raised(&self, interior: &Interior, face: usize) -> [f64; 45] {
+        let mut net = boundary_net_sextic(&self.mesh, &self.network, face);
+        for corner in 0..3 {
+            for s in 1..=4 {
+                net[first_inner_index(6, corner, s)] =
+                    interior[first_inner_slot(corner, sextic_step(s))];
+            }
+        }
+        net[index([2, 2, 2])] = interior[INNERMOST_SLOTS[0]];
+        let raised = raise(&net);
+        let mut out = [0.0; 3 * N_INTERIOR];
+        for (slot, i) in interior_indices().into_iter().enumerate() {
+            out[3 * slot..3 * slot + 3].copy_from_slice(raised[i].as_slice());
+        }
+        out
+    }
+}
+
+/// `mu0` and `mu1` of degree 6 from `[lambda0, mu0, mu1]` of degree 7: a row of degree 7 is 6/7 of
+/// that of degree 6 and 1/7 of the curve, so that `mu = 6/7 mu' + t/7`.
+fn sextic_mu([_, mu0, mu1]: [f64; 3]) -> [f64; 2] {
+    let first = 7.0 / 6.0 * mu0;
+    [first, ((14.0 / 3.0) * (mu1 - 1.0 / 28.0) - first) / 3.0]
+}
+
+/// A net of degree 6 raised to degree 7: `7 b = i b'(i-1,j,k) + j b'(i,j-1,k) + k b'(i,j,k-1)`.
+fn raise(net: &[Vec3; n_control(6)]) -> [Vec3; N_CONTROL] {
+    let mut out = [Vec3::zeros(); N_CONTROL];
+    for e in exponents(DEGREE) {
+        let mut sum = Vec3::zeros();
+        for k in 0..3 {
+            if let Some(less) = e[k].checked_sub(1) {
+                let mut below = e;
+                below[k] = less;
+                sum += e[k] as f64 * net[index(below)];
+            }
+        }
+        out[index(e)] = sum / 7.0;
+    }
+    out
+}
+
+/// Step `s` (1..=4) of the first inner row along `h`.
+fn at(surface: &[Interior], h: HalfEdge, s: usize) -> Vec3 {
+    surface[h.face() as usize][first_inner_slot(h.corner() as usize, sextic_step(s))]
+}
+
+fn at_mut(surface: &mut [Interior], h: HalfEdge, s: usize) -> &mut Vec3 {
+    &mut surface[h.face() as usize][first_inner_slot(h.corner() as usize, sextic_step(s))]
+}
