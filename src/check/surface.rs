@@ -1,7 +1,7 @@
 //! The surface as the checker sees it: vertices, faces and expanded nets.
 
 use isospline_artifact::kinds::PatchesView;
-use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL};
+use isospline_geometry::bezier_triangle::N_CONTROL;
 use isospline_geometry::{Aabb, HalfEdge, Vec3};
 
 /// Control points of one degree-7 patch, in storage order, model units.

@@ -5,7 +5,7 @@
 
 use crate::{About, ExportError};
 use isospline_artifact::kinds::PatchesView;
-use isospline_geometry::bezier_triangle::{DEGREE, index};
+use isospline_geometry::bezier_triangle::index;
 use std::io::Write;
 
 /// Kind of a triangular patch of a total degree.
@@ -16,13 +16,14 @@ pub(crate) fn write(
     about: &About,
     out: &mut dyn Write,
 ) -> Result<(), ExportError> {
+    let degree = patches.degree();
     writeln!(out, "Group 0 {}", word(&about.name))?;
     for f in 0..patches.face.len() {
-        let net = patches.net(f);
-        writeln!(out, "{TRIANGLE}\n{DEGREE}")?;
-        for row in 0..=DEGREE {
-            for step in 0..=DEGREE - row {
-                let p = net[index([DEGREE - row - step, step, row])];
+        let net = patches.own_net(f);
+        writeln!(out, "{TRIANGLE}\n{degree}")?;
+        for row in 0..=degree {
+            for step in 0..=degree - row {
+                let p = net[index([degree - row - step, step, row])];
                 writeln!(out, "{:?} {:?} {:?}", p.x, p.y, p.z)?;
             }
         }
@@ -59,5 +60,15 @@ mod tests {
         // The second patch: its base has eight points, the last point is alone in its row.
         let patch = &lines[1 + 38 + 2..][..36];
         assert_eq!([patch[0], patch[7], patch[35]], [corner(0), corner(1), corner(2)]);
+    }
+
+    #[test]
+    fn patches_of_degree_6_have_28_points() {
+        let patches = sample::of_degree_six(sample::ball_and_ring());
+        let mut out = Vec::new();
+        write(&patches.view(), &About::default(), &mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!((lines[2], lines.len()), ("6", 1 + 200 * 30));
     }
 }

@@ -5,7 +5,6 @@ use crate::{
     About, ExportError, StepOptions, bezier_view, glb, msh, npz, obj, ply, step, stl, three_mf, vtu,
 };
 use isospline_artifact::kinds::PatchesView;
-use isospline_geometry::bezier_triangle::DEGREE;
 use std::fmt;
 use std::io::{BufWriter, Write};
 use std::str::FromStr;
@@ -15,11 +14,11 @@ use std::str::FromStr;
 pub enum Format {
     /// numpy archive: vertices, faces, control points, degree. Exact.
     Npz,
-    /// VTK unstructured grid of degree-7 Bézier triangles. Exact.
+    /// VTK unstructured grid of Bézier triangles. Exact.
     Vtu,
     /// Gmsh 4.1 text: triangles of order 1 to 7 through points of the patches. Exact at order 7.
     Msh,
-    /// `BezierView` text: degree-7 Bézier triangles. Exact.
+    /// `BezierView` text: Bézier triangles. Exact.
     Bv,
     /// ISO 10303 solids of polynomial patches. Exact.
     Step,

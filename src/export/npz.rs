@@ -1,12 +1,12 @@
 //! numpy archives: `np.load(file)["control_points"]` is all of the surface.
 //!
 //! `vertices` (V, 3) f64, `faces` (F, 3) u32, `control_points` (F, 36, 3) f64 in storage order,
-//! `degree` i32 scalar. All little-endian, rows first.
+//! of degree 6 (F, 28, 3), `degree` i32 scalar. All little-endian, rows first.
 
 use crate::ExportError;
 use crate::zip_archive::{self, Content};
 use isospline_artifact::kinds::PatchesView;
-use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL};
+use isospline_geometry::bezier_triangle::n_control;
 use std::io::{self, Write};
 
 pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<(), ExportError> {
@@ -25,16 +25,16 @@ pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<()
         Ok(())
     };
     let control_points: Content<'_> = &|out| {
-        array_header(out, "<f8", &format!("({n_faces}, {N_CONTROL}, 3)"))?;
+        let n_points = n_control(patches.degree());
+        array_header(out, "<f8", &format!("({n_faces}, {n_points}, 3)"))?;
         for f in 0..n_faces {
-            let net = patches.net(f);
-            write_floats(out, net.iter().flatten())?;
+            write_floats(out, patches.own_net(f).iter().flatten())?;
         }
         Ok(())
     };
     let degree: Content<'_> = &|out| {
         array_header(out, "<i4", "()")?;
-        out.write_all(&(DEGREE as i32).to_le_bytes())
+        out.write_all(&(patches.degree() as i32).to_le_bytes())
     };
     let entries = [
         ("vertices.npy", vertices),

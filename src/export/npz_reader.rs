@@ -3,6 +3,7 @@
 use crate::zip_archive::{CENTRAL, END, LOCAL};
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL};
+use isospline_geometry::degree_change::{N_SEXTIC, raise_sextic};
 use std::io::Read;
 
 /// The arrays of an archive.
@@ -12,7 +13,7 @@ pub struct NpzSurface {
     pub vertices: Vec<Vec3>,
     /// Corners of each face, (F, 3).
     pub faces: Vec<[u32; 3]>,
-    /// Control points of each face, (F, 36, 3), in storage order.
+    /// Control points of each face, (F, 36, 3), in storage order; raised where they are of degree 6.
     pub control_points: Vec<[Vec3; N_CONTROL]>,
 }
 
@@ -63,7 +64,7 @@ pub enum NpzError {
         expected: &'static str,
     },
     /// The patches have another degree.
-    #[error("patches of degree {0} cannot be read, only of degree 7")]
+    #[error("patches of degree {0} cannot be read, only of degree 6 or 7")]
     Degree(i64),
     /// A vertex index is negative or too large for 32 bits.
     #[error("face {face} names vertex {vertex}")]
@@ -83,24 +84,28 @@ pub fn read_npz(input: &mut dyn Read) -> Result<NpzSurface, NpzError> {
     let mut bytes = Vec::new();
     input.read_to_end(&mut bytes)?;
     let directory = Directory::of(&bytes)?;
-    if let Some(entry) = directory.find("degree") {
-        let degree = Array::parse("degree", entry?)?.integers()?;
-        if degree.as_slice() != [DEGREE as i64] {
-            return Err(NpzError::Degree(degree.first().copied().unwrap_or(-1)));
-        }
-    }
+    let degree = match directory.find("degree") {
+        None => DEGREE,
+        Some(entry) => match Array::parse("degree", entry?)?.integers()?.as_slice() {
+            [6] => 6,
+            [7] => DEGREE,
+            other => return Err(NpzError::Degree(other.first().copied().unwrap_or(-1))),
+        },
+    };
     let vertices = directory.array("vertices")?.shaped("(V, 3)", &[3])?.floats()?;
     let faces = directory.array("faces")?.shaped("(F, 3)", &[3])?.integers()?;
-    let nets = directory.array("control_points")?;
-    let nets = nets.shaped("(F, 36, 3)", &[N_CONTROL, 3])?.floats()?;
+    let (n_control, shape) =
+        if degree == 6 { (N_SEXTIC, "(F, 28, 3)") } else { (N_CONTROL, "(F, 36, 3)") };
+    let nets = directory.array("control_points")?.shaped(shape, &[n_control, 3])?.floats()?;
     let point = |p: &[f64]| Vec3::new(p[0], p[1], p[2]);
+    let net = |row: &[f64]| match degree {
+        6 => raise_sextic(&std::array::from_fn(|q| point(&row[3 * q..3 * q + 3]))),
+        _ => std::array::from_fn(|q| point(&row[3 * q..3 * q + 3])),
+    };
     Ok(NpzSurface {
         vertices: vertices.chunks_exact(3).map(point).collect(),
         faces: vertex_indices(&faces)?,
-        control_points: nets
-            .chunks_exact(3 * N_CONTROL)
-            .map(|net| std::array::from_fn(|q| point(&net[3 * q..3 * q + 3])))
-            .collect(),
+        control_points: nets.chunks_exact(3 * n_control).map(net).collect(),
     })
 }
 
@@ -309,6 +314,21 @@ mod tests {
         assert_eq!(found.vertices, vertices);
         for (f, net) in found.control_points.iter().enumerate() {
             assert_eq!(*net, patches.view().net(f));
+        }
+    }
+
+    #[test]
+    fn patches_of_degree_6_are_read_back_raised() {
+        let patches = sample::of_degree_six(sample::ball_and_ring());
+        let mut bytes = Vec::new();
+        write(Format::Npz, &patches.view(), &Options::default(), &mut bytes).unwrap();
+        let shape = b"(200, 28, 3)";
+        assert!(bytes.windows(shape.len()).any(|w| w == shape));
+        let found = read_npz(&mut &bytes[..]).unwrap();
+        for (f, net) in found.control_points.iter().enumerate() {
+            for (a, b) in net.iter().zip(patches.view().net(f)) {
+                assert!((a - b).norm() < 1e-14, "face {f}");
+            }
         }
     }
 

@@ -1,16 +1,13 @@
-//! A Bézier triangle as tensor-product patches of bidegree (7, 7): three quads, or one with a
-//! collapsed side. Exact: `p` composed with a bilinear map of the square.
+//! A Bézier triangle of degree n as tensor-product patches of bidegree (n, n): three quads, or one
+//! with a collapsed side. Exact: `p` composed with a bilinear map of the square.
 //!
 //! Net of the composition: `c_ij = sum_k C(i,k) C(n-i,j-k) / C(n,j) * blossom(Q11^k, Q10^(i-k),
-//! Q01^(j-k), Q00^(n-i-j+k))`, the blossom of a degree-7 triangle at the corners of the quad
-//! \[derived\]; as a matrix of 64 x 36 numbers, the same for every triangle.
+//! Q01^(j-k), Q00^(n-i-j+k))`, the blossom of the triangle at the corners of the quad \[derived\]; as
+//! a matrix, of 64 x 36 numbers for degree 7, the same for every triangle.
 
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_curve::binomial;
-use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, exponents, index};
-
-/// Control points a side.
-pub(crate) const SIDE: usize = DEGREE + 1;
+use isospline_geometry::bezier_triangle::{exponents, index, n_control};
 
 /// Corners of a quad in barycentric coordinates of the triangle: at (0,0), (1,0), (0,1), (1,1).
 #[derive(Clone, Copy, Debug)]
@@ -41,31 +38,30 @@ impl Corners {
     }
 }
 
-/// Weights of the 36 control points of a triangle in the 64 of a quad.
+/// Weights of the control points of a triangle in those of a quad.
 #[derive(Clone, Debug)]
 pub(crate) struct QuadMap {
-    /// Row `SIDE * i + j` belongs to `c_ij`.
-    weights: Vec<[f64; N_CONTROL]>,
+    degree: usize,
+    /// Row `(degree + 1) i + j` belongs to `c_ij`.
+    weights: Vec<Vec<f64>>,
 }
 
 impl QuadMap {
-    pub(crate) fn new(corners: &Corners) -> Self {
-        let entry = |i: usize, j: usize| entry(corners, i, j);
-        let weights = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j)));
-        Self { weights: weights.map(|(i, j)| entry(i, j)).collect() }
+    pub(crate) fn new(degree: usize, corners: &Corners) -> Self {
+        let places = (0..=degree).flat_map(|i| (0..=degree).map(move |j| [i, j]));
+        Self { degree, weights: places.map(|at| entry(degree, corners, at)).collect() }
     }
 
     /// Control point `c_ij`: i counts along u, j along v.
-    pub(crate) fn point(&self, net: &[Vec3; N_CONTROL], i: usize, j: usize) -> Vec3 {
-        let weights = &self.weights[SIDE * i + j];
+    pub(crate) fn point(&self, net: &[Vec3], i: usize, j: usize) -> Vec3 {
+        let weights = &self.weights[(self.degree + 1) * i + j];
         let terms = weights.iter().zip(net);
         terms.filter(|(w, _)| **w != 0.0).fold(Vec3::zeros(), |sum, (w, p)| sum + *w * p)
     }
 }
 
-fn entry(corners: &Corners, i: usize, j: usize) -> [f64; N_CONTROL] {
-    let n = DEGREE;
-    let mut sum = [0.0; N_CONTROL];
+fn entry(n: usize, corners: &Corners, [i, j]: [usize; 2]) -> Vec<f64> {
+    let mut sum = vec![0.0; n_control(n)];
     for k in (i + j).saturating_sub(n)..=i.min(j) {
         let arguments = [
             (corners.q11, k),
@@ -74,7 +70,7 @@ fn entry(corners: &Corners, i: usize, j: usize) -> [f64; N_CONTROL] {
             (corners.q00, n + k - i - j),
         ];
         let share = binomial(i, k) * binomial(n - i, j - k) / binomial(n, j);
-        for (sum, weight) in sum.iter_mut().zip(blossom_weights(&arguments)) {
+        for (sum, weight) in sum.iter_mut().zip(blossom_weights(n, &arguments)) {
             *sum += share * weight;
         }
     }
@@ -82,14 +78,14 @@ fn entry(corners: &Corners, i: usize, j: usize) -> [f64; N_CONTROL] {
 }
 
 /// Weights of the control points in the blossom at these points, each as often as it says.
-fn blossom_weights(arguments: &[([f64; 3], usize)]) -> [f64; N_CONTROL] {
+fn blossom_weights(n: usize, arguments: &[([f64; 3], usize)]) -> Vec<f64> {
     // De Casteljau backwards: one argument a step spreads each weight to three exponents.
-    let mut weights = [0.0; N_CONTROL];
+    let mut weights = vec![0.0; n_control(n)];
     weights[0] = 1.0;
     let mut degree = 0;
     for &(at, times) in arguments {
         for _ in 0..times {
-            let mut next = [0.0; N_CONTROL];
+            let mut next = vec![0.0; n_control(n)];
             for (weight, [i, j, k]) in weights.into_iter().zip(exponents(degree)) {
                 next[index([i + 1, j, k])] += weight * at[0];
                 next[index([i, j + 1, k])] += weight * at[1];
@@ -103,13 +99,14 @@ fn blossom_weights(arguments: &[([f64; 3], usize)]) -> [f64; N_CONTROL] {
 }
 
 /// The two halves of a Bézier curve, each from its start.
-pub(crate) fn halves(curve: &[Vec3; SIDE]) -> [[Vec3; SIDE]; 2] {
-    let mut row = *curve;
-    let mut halves = [*curve; 2];
-    for step in 0..SIDE {
+pub(crate) fn halves(curve: &[Vec3]) -> [Vec<Vec3>; 2] {
+    let degree = curve.len() - 1;
+    let mut row = curve.to_vec();
+    let mut halves = [row.clone(), row.clone()];
+    for step in 0..=degree {
         halves[0][step] = row[0];
-        halves[1][DEGREE - step] = row[DEGREE - step];
-        for k in 0..DEGREE - step {
+        halves[1][degree - step] = row[degree - step];
+        for k in 0..degree - step {
             row[k] = 0.5 * (row[k] + row[k + 1]);
         }
     }
@@ -122,24 +119,27 @@ mod tests {
     use isospline_geometry::bezier_curve;
     use isospline_geometry::bezier_triangle::{boundary_index, evaluate};
 
-    fn net() -> [Vec3; N_CONTROL] {
-        std::array::from_fn(|k| {
+    fn net(degree: usize) -> Vec<Vec3> {
+        let point = |k: usize| {
             let x = k as f64;
             Vec3::new(x * 0.3 - 2.0, libm::sin(x), 0.01 * x * x)
-        })
+        };
+        (0..n_control(degree)).map(point).collect()
     }
 
-    fn on_quad(map: &QuadMap, u: f64, v: f64) -> Vec3 {
+    fn on_quad(degree: usize, corners: &Corners, u: f64, v: f64) -> Vec3 {
+        let map = QuadMap::new(degree, corners);
         let row = |i: usize| {
-            let column: Vec<Vec3> = (0..SIDE).map(|j| map.point(&net(), i, j)).collect();
+            let column: Vec<Vec3> = (0..=degree).map(|j| map.point(&net(degree), i, j)).collect();
             bezier_curve::evaluate(&column, v)
         };
-        bezier_curve::evaluate(&(0..SIDE).map(row).collect::<Vec<_>>(), u)
+        bezier_curve::evaluate(&(0..=degree).map(row).collect::<Vec<_>>(), u)
     }
 
     #[test]
     fn quads_are_the_triangle_composed_with_a_bilinear_map() {
-        for (u, v) in [(0.0, 0.0), (0.3, 0.8), (1.0, 0.4), (0.9, 1.0)] {
+        let places = [(0.0, 0.0), (0.3, 0.8), (1.0, 0.4), (0.9, 1.0)];
+        for (degree, (u, v)) in places.into_iter().flat_map(|at| [(6, at), (7, at)]) {
             for corner in 0..3 {
                 let corners = Corners::at_corner(corner);
                 let Corners { q00, q10, q01, q11 } = corners;
@@ -147,26 +147,27 @@ mod tests {
                     (1.0 - u) * ((1.0 - v) * q00[k] + v * q01[k])
                         + u * ((1.0 - v) * q10[k] + v * q11[k])
                 });
-                let found = on_quad(&QuadMap::new(&corners), u, v);
-                assert!((found - evaluate(DEGREE, &net(), at)).norm() < 1e-13);
+                let found = on_quad(degree, &corners, u, v);
+                assert!((found - evaluate(degree, &net(degree), at)).norm() < 1e-13);
             }
-            let found = on_quad(&QuadMap::new(&Corners::collapsed()), u, v);
-            let expected = evaluate(DEGREE, &net(), [1.0 - u, u * (1.0 - v), u * v]);
+            let found = on_quad(degree, &Corners::collapsed(), u, v);
+            let expected = evaluate(degree, &net(degree), [1.0 - u, u * (1.0 - v), u * v]);
             assert!((found - expected).norm() < 1e-13);
         }
     }
 
     #[test]
     fn the_first_row_of_a_quad_is_half_an_edge() {
-        for corner in 0..3 {
-            let map = QuadMap::new(&Corners::at_corner(corner));
-            let edge = std::array::from_fn(|s| net()[boundary_index(DEGREE, corner, s)]);
+        for (degree, corner) in (0..3).flat_map(|corner| [(6, corner), (7, corner)]) {
+            let (map, net) = (QuadMap::new(degree, &Corners::at_corner(corner)), net(degree));
+            let edge: Vec<Vec3> =
+                (0..=degree).map(|s| net[boundary_index(degree, corner, s)]).collect();
             let [first, second] = halves(&edge);
             for (i, expected) in first.iter().enumerate() {
-                assert!((map.point(&net(), i, 0) - expected).norm() < 1e-14);
+                assert!((map.point(&net, i, 0) - expected).norm() < 1e-14);
             }
-            assert_eq!(first[DEGREE], second[0]);
-            assert_eq!((first[0], second[DEGREE]), (edge[0], edge[DEGREE]));
+            assert_eq!(first[degree], second[0]);
+            assert_eq!((first[0], second[degree]), (edge[0], edge[degree]));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use isospline_artifact::kinds::{PatchMeta, Patches};
 use isospline_geometry::bezier_triangle::{DEGREE, grid, interior_indices};
+use isospline_geometry::degree_change::raise_sextic;
 use isospline_geometry::{TriangleMesh, Vec3};
 
 /// Genus 0 and genus 1: Euler characteristic 2, two components, 8 + 192 faces.
@@ -40,6 +41,19 @@ pub(crate) fn hollow_ball_and_ring() -> Patches {
     let n_vertices = solid.position.len() as u32;
     hollow.face.extend(solid.face[..BALL_FACES].iter().map(|face| face.map(|v| v + n_vertices)));
     hollow
+}
+
+/// The same with patches of degree 6: those with the same twists.
+pub(crate) fn of_degree_six(mut patches: Patches) -> Patches {
+    patches.meta[0].degree = 6;
+    let view = patches.view();
+    let lowered = |f: usize| {
+        let net: Vec<Vec3> = view.own_net(f);
+        let raised = raise_sextic(&net.try_into().expect("invariant: 28 points"));
+        flat(interior_indices().map(|i| raised[i]))
+    };
+    patches.interior = (0..view.face.len()).map(lowered).collect();
+    patches
 }
 
 const EDGE: &str = "invariant: a closed mesh has both directions of an edge";

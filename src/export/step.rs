@@ -1,6 +1,6 @@
 //! STEP (ISO 10303-21): solids of polynomial patches, exact, AP242 or AP214.
 //!
-//! Every triangle becomes three quads of bidegree (7, 7), regular everywhere, or one patch with a
+//! Every triangle becomes three quads of its degree both ways, regular everywhere, or one patch with a
 //! collapsed side. Faces name the control points of their shared edges by number, so the borders
 //! of neighbours agree in all bits because they are the same entities. Entity numbers follow from
 //! a fixed layout; nothing is kept but two words an edge.

@@ -1,30 +1,27 @@
 //! VTK unstructured grids: one cell of type 76, `VTK_BEZIER_TRIANGLE`, a face, exact.
 //!
-//! Points are merged: the vertices, six a raised edge, fifteen a face; so neighbouring cells share
-//! the points of their edge. Arrays follow the XML as raw bytes.
+//! Points are merged: the vertices, six a raised edge, fifteen a face (five and ten of degree 6); so
+//! neighbouring cells share the points of their edge. Arrays follow the XML as raw bytes.
 
 use crate::ExportError;
 use crate::node_order::corners_edges_inside;
 use isospline_artifact::kinds::PatchesView;
-use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, interior_indices,
-};
+use isospline_geometry::bezier_triangle::{boundary_index, exponents, index, n_control};
 use std::io::{self, Write};
 
 const VTK_BEZIER_TRIANGLE: u8 = 76;
-/// Raised control points of an edge between its ends.
-const N_EDGE: usize = DEGREE - 1;
 
 pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<(), ExportError> {
     let (n_vertices, n_edges) = (patches.position.len(), patches.boundary.len());
-    let n_faces = patches.face.len();
-    let n_points = n_vertices + N_EDGE * n_edges + N_INTERIOR * n_faces;
-    let sizes = [24 * n_points, 8 * N_CONTROL * n_faces, 8 * n_faces, n_faces];
+    let (n_faces, degree) = (patches.face.len(), patches.degree());
+    let n_points = n_vertices + (degree - 1) * n_edges + interior(degree).len() * n_faces;
+    let n_control = n_control(degree);
+    let sizes = [24 * n_points, 8 * n_control * n_faces, 8 * n_faces, n_faces];
     write_head(out, n_points, n_faces, sizes)?;
     begin_array(out, sizes[0])?;
     write_points(patches, out)?;
     begin_array(out, sizes[1])?;
-    let order = corners_edges_inside(DEGREE);
+    let order = corners_edges_inside(degree);
     for f in 0..n_faces {
         let numbers = point_numbers(patches, f);
         for &q in &order {
@@ -33,7 +30,7 @@ pub(crate) fn write(patches: &PatchesView<'_>, out: &mut dyn Write) -> Result<()
     }
     begin_array(out, sizes[2])?;
     for f in 1..=n_faces {
-        out.write_all(&((N_CONTROL * f) as i64).to_le_bytes())?;
+        out.write_all(&((n_control * f) as i64).to_le_bytes())?;
     }
     begin_array(out, sizes[3])?;
     for _ in 0..n_faces {
@@ -84,14 +81,17 @@ fn write_points(patches: &PatchesView<'_>, out: &mut dyn Write) -> io::Result<()
     for p in patches.position {
         put(p)?;
     }
+    let degree = patches.degree();
     for half in halves_from_the_lower_vertex(patches) {
-        let net = patches.net(half / 3);
-        for s in 1..DEGREE {
-            put(net[boundary_index(DEGREE, half % 3, s)].as_slice())?;
+        let net = patches.own_net(half / 3);
+        for s in 1..degree {
+            put(net[boundary_index(degree, half % 3, s)].as_slice())?;
         }
     }
-    for inner in patches.interior {
-        put(inner)?;
+    let interior = interior(degree);
+    for f in 0..patches.face.len() {
+        let net = patches.own_net(f);
+        interior.iter().try_for_each(|&q| put(net[q].as_slice()))?;
     }
     Ok(())
 }
@@ -113,23 +113,30 @@ fn runs_upward(patches: &PatchesView<'_>, half: usize) -> bool {
 }
 
 /// Numbers of the points of face `f`, in storage order.
-fn point_numbers(patches: &PatchesView<'_>, f: usize) -> [usize; N_CONTROL] {
+fn point_numbers(patches: &PatchesView<'_>, f: usize) -> Vec<usize> {
     let (n_vertices, n_edges) = (patches.position.len(), patches.boundary.len());
-    let mut numbers = [0; N_CONTROL];
+    let degree = patches.degree();
+    let (n_edge, interior) = (degree - 1, interior(degree));
+    let mut numbers = vec![0; n_control(degree)];
     for corner in 0..3 {
-        numbers[boundary_index(DEGREE, corner, 0)] = patches.face[f][corner] as usize;
+        numbers[boundary_index(degree, corner, 0)] = patches.face[f][corner] as usize;
         let half = 3 * f + corner;
-        let first = n_vertices + N_EDGE * patches.edge_of[half] as usize;
-        for s in 1..DEGREE {
-            let step = if runs_upward(patches, half) { s } else { DEGREE - s };
-            numbers[boundary_index(DEGREE, corner, s)] = first + step - 1;
+        let first = n_vertices + n_edge * patches.edge_of[half] as usize;
+        for s in 1..degree {
+            let step = if runs_upward(patches, half) { s } else { degree - s };
+            numbers[boundary_index(degree, corner, s)] = first + step - 1;
         }
     }
-    let first = n_vertices + N_EDGE * n_edges + N_INTERIOR * f;
-    for (slot, q) in interior_indices().into_iter().enumerate() {
+    let first = n_vertices + n_edge * n_edges + interior.len() * f;
+    for (slot, q) in interior.into_iter().enumerate() {
         numbers[q] = first + slot;
     }
     numbers
+}
+
+/// Indices of the control points on no edge, in storage order.
+fn interior(degree: usize) -> Vec<usize> {
+    exponents(degree).filter(|e| e.iter().all(|&x| x > 0)).map(index).collect()
 }
 
 #[cfg(test)]
@@ -140,35 +147,39 @@ mod tests {
 
     #[test]
     fn points_by_number_are_the_nets_in_all_bits() {
-        let patches = sample::ball_and_ring();
-        let view = patches.view();
-        let mut bytes = Vec::new();
-        write_points(&view, &mut bytes).unwrap();
-        let coordinates: Vec<f64> =
-            bytes.as_chunks::<8>().0.iter().map(|&b| f64::from_le_bytes(b)).collect();
-        for f in 0..view.face.len() {
-            for (number, p) in point_numbers(&view, f).into_iter().zip(view.net(f)) {
-                let found = Vec3::from_column_slice(&coordinates[3 * number..3 * number + 3]);
-                assert_eq!(found.map(f64::to_bits), p.map(f64::to_bits));
+        let septic = sample::ball_and_ring();
+        for patches in [sample::of_degree_six(septic.clone()), septic] {
+            let view = patches.view();
+            let mut bytes = Vec::new();
+            write_points(&view, &mut bytes).unwrap();
+            let coordinates: Vec<f64> =
+                bytes.as_chunks::<8>().0.iter().map(|&b| f64::from_le_bytes(b)).collect();
+            for f in 0..view.face.len() {
+                for (number, p) in point_numbers(&view, f).into_iter().zip(view.own_net(f)) {
+                    let found = Vec3::from_column_slice(&coordinates[3 * number..3 * number + 3]);
+                    assert_eq!(found.map(f64::to_bits), p.map(f64::to_bits));
+                }
             }
         }
     }
 
     #[test]
     fn arrays_stand_where_the_head_says() {
-        let patches = sample::ball_and_ring();
-        let mut bytes = Vec::new();
-        write(&patches.view(), &mut bytes).unwrap();
-        let start = bytes.windows(2).position(|w| w == b" _").unwrap() + 2;
-        let head = std::str::from_utf8(&bytes[..start]).unwrap();
-        let n_faces = patches.face.len() as u64;
-        let wanted = [n_faces * 36 * 8, n_faces * 8, n_faces];
-        for (name, size) in ["connectivity", "offsets", "types"].into_iter().zip(wanted) {
-            let tag = head.split_once(name).unwrap().1.split_once("offset=\"").unwrap().1;
-            let offset: usize = tag.split_once('"').unwrap().0.parse().unwrap();
-            let at = start + offset;
-            assert_eq!(bytes[at..at + 8], size.to_le_bytes(), "{name}");
+        let septic = sample::ball_and_ring();
+        for (patches, n) in [(sample::of_degree_six(septic.clone()), 28), (septic, 36)] {
+            let mut bytes = Vec::new();
+            write(&patches.view(), &mut bytes).unwrap();
+            let start = bytes.windows(2).position(|w| w == b" _").unwrap() + 2;
+            let head = std::str::from_utf8(&bytes[..start]).unwrap();
+            let n_faces = patches.face.len() as u64;
+            let wanted = [n_faces * n * 8, n_faces * 8, n_faces];
+            for (name, size) in ["connectivity", "offsets", "types"].into_iter().zip(wanted) {
+                let tag = head.split_once(name).unwrap().1.split_once("offset=\"").unwrap().1;
+                let offset: usize = tag.split_once('"').unwrap().0.parse().unwrap();
+                let at = start + offset;
+                assert_eq!(bytes[at..at + 8], size.to_le_bytes(), "{name}");
+            }
+            assert!(bytes.ends_with(b"\x4c\n  </AppendedData>\n</VTKFile>\n"));
         }
-        assert!(bytes.ends_with(b"\x4c\n  </AppendedData>\n</VTKFile>\n"));
     }
 }

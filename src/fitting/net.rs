@@ -1,11 +1,12 @@
 //! Nets of faces put together from the rows of several stages.
 
-use isospline_artifact::kinds::{BaseMeshView, NetworkView};
 use crate::edge_end::outgoing_curve;
+use isospline_artifact::kinds::{BaseMeshView, NetworkView};
 use isospline_geometry::bezier_curve::{raise_quartic_to_septic, raise_quartic_to_sextic};
 use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, interior_indices, n_control,
+    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, interior_indices,
 };
+use isospline_geometry::degree_change::N_SEXTIC;
 use isospline_geometry::{HalfEdge, Vec3};
 use std::ops::Range;
 
@@ -31,8 +32,8 @@ pub fn boundary_net_sextic(
     mesh: &BaseMeshView<'_>,
     network: &NetworkView<'_>,
     face: usize,
-) -> [Vec3; n_control(6)] {
-    let mut net = [Vec3::zeros(); n_control(6)];
+) -> [Vec3; N_SEXTIC] {
+    let mut net = [Vec3::zeros(); N_SEXTIC];
     for (corner, curve) in curves(mesh, network, face, raise_quartic_to_sextic).iter().enumerate() {
         for (s, &p) in curve.iter().enumerate() {
             net[boundary_index(6, corner, s)] = p;

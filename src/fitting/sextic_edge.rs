@@ -153,21 +153,13 @@ pub fn fourth_difference(q: &[Vec3; 5]) -> Vec3 {
 /// Change of the right sides when p1, r1 and `mu1` of the lower end change by these.
 pub fn lower_end(q: &[Vec3; 5], l1: f64, p1: Vec3, r1: Vec3, mu1: f64) -> [Vec3; 3] {
     let d = |i: usize| q[i + 1] - q[i];
-    [
-        9.0 * mu1 * d(1) - 5.0 * ((1.0 - l1) * p1 + l1 * r1),
-        3.0 * mu1 * d(3),
-        5.0 * (p1 - r1),
-    ]
+    [9.0 * mu1 * d(1) - 5.0 * ((1.0 - l1) * p1 + l1 * r1), 3.0 * mu1 * d(3), 5.0 * (p1 - r1)]
 }
 
 /// The same for p4, r4 and the `mu1` of the higher end, which is `1 - mu2` of the edge.
 pub fn higher_end(q: &[Vec3; 5], l0: f64, p4: Vec3, r4: Vec3, mu1: f64) -> [Vec3; 3] {
     let d = |i: usize| q[i + 1] - q[i];
-    [
-        -3.0 * mu1 * d(0),
-        -9.0 * mu1 * d(2) - 5.0 * ((1.0 - l0) * p4 + l0 * r4),
-        5.0 * (r4 - p4),
-    ]
+    [-3.0 * mu1 * d(0), -9.0 * mu1 * d(2) - 5.0 * ((1.0 - l0) * p4 + l0 * r4), 5.0 * (r4 - p4)]
 }
 
 #[cfg(test)]

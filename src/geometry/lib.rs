@@ -5,6 +5,7 @@
 pub mod aabb;
 pub mod bezier_curve;
 pub mod bezier_triangle;
+pub mod degree_change;
 pub mod edit_mesh;
 pub mod half_edge;
 pub mod linear;

@@ -25,13 +25,13 @@ mod tiling;
 pub use error::RelaxError;
 pub use params::RelaxParams;
 
+use degree::Degree;
 use isospline_artifact::kinds::{
     BaseMeshView, CurvatureView, EdgeSystemsView, NetworkView, PatchMeta, Patches, PatchesView,
     VertexSystemsView,
 };
 use isospline_fitting::net::point;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task, map};
-use degree::Degree;
 use moves::Moves;
 use progress::{Progress, Start, TileState};
 use restore::Conditions;
@@ -91,7 +91,7 @@ impl Stage for Relax {
         let moves = Moves::new(ctx.host, &mesh, &network, &vertices, degree);
         let conditions = Conditions { mesh, curvature, network, vertices };
         let start = match degree {
-            Degree::Six => conditions.lowered(ctx.host, &moves, &samples, patches.interior),
+            Degree::Six => conditions.lowered(ctx.host, &moves, patches.interior),
             Degree::Seven => Start {
                 interior: patches.interior.iter().map(interior).collect(),
                 nu: edges.weights.iter().map(|w| w.nu).collect(),

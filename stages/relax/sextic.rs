@@ -10,15 +10,13 @@ use crate::degree::{Degree, sextic_step};
 use crate::moves::Moves;
 use crate::progress::Start;
 use crate::restore::Conditions;
-use crate::samples::{Interior, Samples};
+use crate::samples::Interior;
 use crate::ties::close;
 use isospline_fitting::edge_end::{ccw, cw, outgoing_curve, outgoing_tangent};
-use isospline_fitting::net::{boundary_net_sextic, point};
+use isospline_fitting::net::{boundary_net_sextic, flat_interior, point};
 use isospline_fitting::sextic_edge::SexticEdge;
-use isospline_geometry::bezier_triangle::{
-    DEGREE, INNERMOST_SLOTS, N_CONTROL, N_INTERIOR, boundary_index, exponents, first_inner_index, first_inner_slot,
-    index, interior_indices, n_control,
-};
+use isospline_geometry::bezier_triangle::{N_CONTROL, first_inner_slot, interior_indices};
+use isospline_geometry::degree_change::{lower_to_sextic, raise_sextic};
 use isospline_geometry::{HalfEdge, Vec3};
 use isospline_stage::{Counters, Host, map};
 
@@ -29,39 +27,21 @@ const CLOSINGS: usize = 3;
 
 impl Conditions<'_> {
     /// The exact surface of degree 6 nearest to these septic patches in its twists and rows.
-    pub(crate) fn lowered(
-        &self,
-        host: &dyn Host,
-        moves: &Moves,
-        samples: &Samples,
-        septic: &[[f64; 45]],
-    ) -> Start {
-        let lowered = |f: usize| self.lowered_face(samples, &septic[f], f);
-        let interior = map(host, septic.len(), lowered);
+    pub(crate) fn lowered(&self, host: &dyn Host, moves: &Moves, septic: &[[f64; 45]]) -> Start {
+        let interior = map(host, septic.len(), |f| self.lowered_face(&septic[f], f));
         let n_edges = self.mesh.edge.len();
         let mut start = Start { interior, nu: vec![0.0; n_edges], gap: vec![0.0; n_edges] };
         self.restore_sextic(host, moves, &mut start.interior, &mut start.nu);
         start
     }
 
-    fn lowered_face(&self, samples: &Samples, septic: &[f64; 45], face: usize) -> Interior {
-        let net = Degree::Six.boundary_net(&self.mesh, &self.network, face);
-        let mut out = samples.even(&net);
+    /// Interior points, in their septic slots, of the patch of degree 6 with the same twists.
+    fn lowered_face(&self, septic: &[f64; 45], face: usize) -> Interior {
         let boundary = boundary_net_sextic(&self.mesh, &self.network, face);
-        for corner in 0..3 {
-            let along = |s: usize| boundary[boundary_index(6, corner, s)];
-            let septic = |s: usize| point(septic, first_inner_slot(corner, s));
-            let twist = |s: usize| {
-                let h = HalfEdge::new(face as u32, ((corner + usize::from(s > 1)) % 3) as u32);
-                self.sextic_twist(h, septic(s))
-            };
-            // 7 b(4,2,1) = 4 b'(3,2,1) + 2 b'(4,1,1) + b'(4,2,0), and from the other end.
-            let (first, last) = (twist(1), twist(5));
-            out[first_inner_slot(corner, 1)] = first;
-            out[first_inner_slot(corner, 2)] = (7.0 * septic(2) - 2.0 * first - along(2)) / 4.0;
-            out[first_inner_slot(corner, 4)] = (7.0 * septic(4) - 2.0 * last - along(4)) / 4.0;
-        }
-        out
+        let net = lower_to_sextic(boundary, &std::array::from_fn(|i| point(septic, i)));
+        let mut by_slot = [Vec3::zeros(); N_CONTROL];
+        Degree::Six.slots().into_iter().zip(net).for_each(|(slot, p)| by_slot[slot] = p);
+        interior_indices().map(|i| by_slot[i])
     }
 
     /// Moves twists, `nu` and rows of `surface` least onto the conditions.
@@ -196,19 +176,13 @@ impl Conditions<'_> {
     /// Interior points of the patch raised to degree 7.
     pub(crate) fn raised(&self, interior: &Interior, face: usize) -> [f64; 45] {
         let mut net = boundary_net_sextic(&self.mesh, &self.network, face);
-        for corner in 0..3 {
-            for s in 1..=4 {
-                net[first_inner_index(6, corner, s)] =
-                    interior[first_inner_slot(corner, sextic_step(s))];
+        let slots = interior_indices();
+        for (p, slot) in net.iter_mut().zip(Degree::Six.slots()) {
+            if let Some(i) = slots.iter().position(|&inner| inner == slot) {
+                *p = interior[i];
             }
         }
-        net[index([2, 2, 2])] = interior[INNERMOST_SLOTS[0]];
-        let raised = raise(&net);
-        let mut out = [0.0; 3 * N_INTERIOR];
-        for (slot, i) in interior_indices().into_iter().enumerate() {
-            out[3 * slot..3 * slot + 3].copy_from_slice(raised[i].as_slice());
-        }
-        out
+        flat_interior(&raise_sextic(&net))
     }
 }
 
@@ -217,23 +191,6 @@ impl Conditions<'_> {
 fn sextic_mu([_, mu0, mu1]: [f64; 3]) -> [f64; 2] {
     let first = 7.0 / 6.0 * mu0;
     [first, ((14.0 / 3.0) * (mu1 - 1.0 / 28.0) - first) / 3.0]
-}
-
-/// A net of degree 6 raised to degree 7: `7 b = i b'(i-1,j,k) + j b'(i,j-1,k) + k b'(i,j,k-1)`.
-fn raise(net: &[Vec3; n_control(6)]) -> [Vec3; N_CONTROL] {
-    let mut out = [Vec3::zeros(); N_CONTROL];
-    for e in exponents(DEGREE) {
-        let mut sum = Vec3::zeros();
-        for k in 0..3 {
-            if let Some(less) = e[k].checked_sub(1) {
-                let mut below = e;
-                below[k] = less;
-                sum += e[k] as f64 * net[index(below)];
-            }
-        }
-        out[index(e)] = sum / 7.0;
-    }
-    out
 }
 
 /// Step `s` (1..=4) of the first inner row along `h`.

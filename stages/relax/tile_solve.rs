@@ -64,13 +64,7 @@ pub(crate) struct Outcome {
 impl Problem<'_> {
     /// One step that lowers the squared distance of the tile's samples, or mends its folds, if one
     /// of a few does; none if all are within `goal`, in model units.
-    pub(crate) fn visit(
-        &self,
-        tile: &Tile,
-        at: &Progress,
-        damping: f64,
-        goal: f64,
-    ) -> Outcome {
+    pub(crate) fn visit(&self, tile: &Tile, at: &Progress, damping: f64, goal: f64) -> Outcome {
         let interior: Vec<Interior> = tile.faces.iter().map(|&f| at.interior[f as usize]).collect();
         let faces = self.faces(tile);
         let here = self.measure(&faces, &interior);

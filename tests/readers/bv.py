@@ -8,7 +8,7 @@ here.
 
 import numpy as np
 
-from surface import EXPONENTS, bernstein, check, surfaces
+from surface import bernstein, check, exponents_of, surfaces
 
 TOTAL_DEGREE_PATCH = "3"
 
@@ -30,26 +30,28 @@ def patches(path):
     return found
 
 
-def place(row, step, degree=7):
-    """Exponents of a point: the base runs from corner 0 to corner 1, the apex is corner 2."""
-    return degree - row - step, step, row
+def order(n):
+    """Storage indices of the points in the file: the base runs from corner 0 to corner 1, the apex
+    is corner 2."""
+    places = [(n - row - step, step, row) for row in range(n + 1) for step in range(n + 1 - row)]
+    return [exponents_of(n).index(place) for place in places]
 
 
-ORDER = [EXPONENTS.index(place(row, step)) for row in range(8) for step in range(8 - row)]
-# A point of each patch that no symmetry of the triangle moves onto itself.
-AT = bernstein([[0.5, 0.3, 0.2]])
 for surface in surfaces():
     path = surface.beside("bv")
     read = patches(path)
     check(len(read) == len(surface.faces), f"{path.name}: {len(read)} patches")
-    check(all(len(rows) == 8 for rows in read), f"{path.name}: a degree other than 7")
+    degree = surface.degree
+    check(all(len(rows) == degree + 1 for rows in read), f"{path.name}: another degree")
+    # A point of each patch that no symmetry of the triangle moves onto itself.
+    at = bernstein([[0.5, 0.3, 0.2]], degree)
     points = np.array([[point for row in rows for point in row] for rows in read])
     nets = np.empty_like(points)
-    nets[:, ORDER] = points
+    nets[:, order(degree)] = points
     agree = np.array_equal(nets.view(np.uint64), surface.nets.view(np.uint64))
     check(agree, f"{path.name}: control points are not those of the npz")
     # The file's own reading, by de Casteljau on its rows, against the polynomials of the npz.
-    for rows, expected in zip(read[::7], (AT @ surface.nets)[::7, 0]):
+    for rows, expected in zip(read[::7], (at @ surface.nets)[::7, 0]):
         rows = [np.array(row) for row in rows]
         while len(rows) > 1:
             rows = [

@@ -54,9 +54,14 @@ make_exports() {
     "${CARGO:-cargo}" run --quiet --release -p isospline-export --example sample_exports -- "$1"
     local isospline="${CARGO_TARGET_DIR:-$root/target}/release/isospline"
     [ -x "$isospline" ] || { echo "foreign readers: build target/release/isospline first"; exit 1; }
-    for model in sphere_80 torus_regular; do
-        "$isospline" run "$root/configs/$model.toml" --set target.fit=paper --out "$1/$model" \
-            >"$1/$model.log" 2>&1 || { cat "$1/$model.log"; exit 1; }
+    convert() {
+        "$isospline" run "$root/configs/$1.toml" --set "$3" --out "$2" >"$2.log" 2>&1 ||
+            { cat "$2.log"; exit 1; }
+    }
+    convert sphere_80 "$1/sphere_80" target.fit=paper
+    convert torus_regular "$1/torus_regular" target.fit=paper
+    convert sphere_80 "$1/sphere_80_sextic" relax.degree=6
+    for model in sphere_80 torus_regular sphere_80_sextic; do
         for format in npz vtu msh bv step glb obj ply stl 3mf; do
             "$isospline" export "$1/$model" --format "$format" -o "$1/$model.$format" >/dev/null
         done

@@ -5,10 +5,14 @@ import sys
 
 import numpy as np
 
-DEGREE = 7
-# Exponents (i, j, k) of the control points in storage order: i descends, then j.
-EXPONENTS = [(DEGREE - r, r - k, k) for r in range(DEGREE + 1) for k in range(r + 1)]
+# Degree of patches of so many control points.
+DEGREES = {28: 6, 36: 7}
 FACTORIAL = [1, 1, 2, 6, 24, 120, 720, 5040]
+
+
+def exponents_of(degree):
+    """Exponents (i, j, k) of the control points in storage order: i descends, then j."""
+    return [(degree - r, r - k, k) for r in range(degree + 1) for k in range(r + 1)]
 
 
 class Surface:
@@ -58,37 +62,38 @@ class Surface:
         return len(self.vertices) - 3 * len(self.faces) // 2 + len(self.faces)
 
 
-def bernstein(points):
-    """Bernstein values (n, 36) of degree 7 at barycentric points (n, 3)."""
+def bernstein(points, degree):
+    """Bernstein values (n, 28 or 36) at barycentric points (n, 3)."""
     u, v, w = np.asarray(points, dtype=float).T
     columns = []
-    for i, j, k in EXPONENTS:
-        multinomial = FACTORIAL[7] // (FACTORIAL[i] * FACTORIAL[j] * FACTORIAL[k])
+    for i, j, k in exponents_of(degree):
+        multinomial = FACTORIAL[degree] // (FACTORIAL[i] * FACTORIAL[j] * FACTORIAL[k])
         columns.append(multinomial * u**i * v**j * w**k)
     return np.stack(columns, axis=1)
 
 
 def volume(nets):
-    """Signed volume within patches (n, 36, 3): Gauss integration of the flux, exact to degree 26."""
+    """Signed volume within patches (n, points, 3): Gauss integration of the flux, exact to degree 26."""
+    degree = DEGREES[nets.shape[1]]
     nodes, weights = np.polynomial.legendre.leggauss(14)
     a, b = np.meshgrid((nodes + 1) / 2, (nodes + 1) / 2, indexing="ij")
     a, b = a.ravel(), b.ravel()
     # The square collapsed into the triangle.
     weight = np.outer(weights, weights).ravel() / 4 * (1 - a)
     points = np.stack([a, (1 - a) * (1 - b), (1 - a) * b], axis=1)
-    values = bernstein(points)
-    along, across = (slopes(points, corner) for corner in (1, 2))
+    values = bernstein(points, degree)
+    along, across = (slopes(points, corner, degree) for corner in (1, 2))
     nets = nets - nets[0, 0]
     position, du, dv = (np.einsum("pc,fcx->fpx", basis, nets) for basis in (values, along, across))
     return np.einsum("p,fpx,fpx->", weight, position, np.cross(du, dv)) / 3
 
 
-def slopes(points, corner):
-    """Derivatives (n, 36) of the Bernstein polynomials from corner 0 towards `corner`."""
+def slopes(points, corner, degree):
+    """Derivatives (n, 28 or 36) of the Bernstein polynomials from corner 0 towards `corner`."""
     powers = np.asarray(points, dtype=float)
     columns = []
-    for exponents in EXPONENTS:
-        factor = FACTORIAL[7] / np.prod([FACTORIAL[e] for e in exponents])
+    for exponents in exponents_of(degree):
+        factor = FACTORIAL[degree] / np.prod([FACTORIAL[e] for e in exponents])
         column = 0
         for k, sign in ((corner, 1), (0, -1)):
             if exponents[k] > 0:
@@ -98,14 +103,14 @@ def slopes(points, corner):
     return np.stack(columns, axis=1)
 
 
-def boundary(corner):
+def boundary(corner, degree):
     """Storage indices of the control points from `corner` to the next one."""
     out = []
-    for s in range(DEGREE + 1):
+    for s in range(degree + 1):
         exponents = [0, 0, 0]
-        exponents[corner] = DEGREE - s
+        exponents[corner] = degree - s
         exponents[(corner + 1) % 3] = s
-        out.append(EXPONENTS.index(tuple(exponents)))
+        out.append(exponents_of(degree).index(tuple(exponents)))
     return out
 
 

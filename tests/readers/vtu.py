@@ -24,17 +24,20 @@ for surface in surfaces():
     grid = reader.GetOutput()
     n_faces, n_vertices = len(surface.faces), len(surface.vertices)
     check(grid.GetNumberOfCells() == n_faces, f"{path.name}: {grid.GetNumberOfCells()} cells")
-    n_points = n_vertices + 6 * (3 * n_faces // 2) + 15 * n_faces
+    degree = surface.degree
+    inside = (degree - 1) * (degree - 2) // 2
+    n_points = n_vertices + (degree - 1) * (3 * n_faces // 2) + inside * n_faces
     check(grid.GetNumberOfPoints() == n_points, f"{path.name}: points along edges are not shared")
     points = vtk_to_numpy(grid.GetPoints().GetData())
     scale = np.ptp(surface.vertices, axis=0).max()
-    weights = bernstein(POINTS)
-    worst, weight_of, sub_id = 0.0, [0.0] * 36, reference(0)
+    weights = bernstein(POINTS, degree)
+    n_control = weights.shape[1]
+    worst, weight_of, sub_id = 0.0, [0.0] * n_control, reference(0)
     for f in range(n_faces):
         cell = grid.GetCell(f)
         check(cell.GetCellType() == VTK_BEZIER_TRIANGLE, f"{path.name}: cell {f} has another type")
-        check(cell.GetNumberOfPoints() == 36, f"{path.name}: cell {f} has another degree")
-        ids = [cell.GetPointId(q) for q in range(36)]
+        check(cell.GetNumberOfPoints() == n_control, f"{path.name}: cell {f} has another degree")
+        ids = [cell.GetPointId(q) for q in range(n_control)]
         ours = surface.nets[f]
         same = np.array_equal(np.sort(points[ids].view("u8"), axis=0), np.sort(ours.view("u8"), axis=0))
         check(same, f"{path.name}: control points of face {f} differ in bits")

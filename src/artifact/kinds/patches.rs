@@ -2,8 +2,9 @@
 
 use crate::artifact;
 use isospline_geometry::Vec3;
-use isospline_geometry::bezier_curve::raise_quartic_to_septic;
+use isospline_geometry::bezier_curve::{raise_quartic_to_septic, raise_quartic_to_sextic};
 use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index, interior_indices};
+use isospline_geometry::degree_change::{N_SEXTIC, lower_to_sextic};
 
 /// How the patches were built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +45,7 @@ impl PatchMeta {
 }
 
 artifact! {
-    /// Degree-7 triangular Bézier patches with quartic boundary curves (fairing).
+    /// Triangular Bézier patches with quartic boundary curves (fairing, relax), as nets of degree 7.
     pub struct Patches / PatchesView = "patches", schema 1 {
         /// What the control points mean.
         meta: PatchMeta, One;
@@ -56,7 +57,7 @@ artifact! {
         edge_of: u32, HalfEdges;
         /// Control points q1, q2, q3 of each edge, from the lower to the higher vertex.
         boundary: [f64; 9], Edges;
-        /// The 15 interior control points in storage order.
+        /// The 15 interior control points in storage order, raised where patches are of degree 6.
         interior: [f64; 45], Faces;
     }
 }
@@ -69,7 +70,7 @@ impl PatchesView<'_> {
     pub fn net(&self, face: usize) -> [Vec3; N_CONTROL] {
         let mut net = [Vec3::zeros(); N_CONTROL];
         for corner in 0..3 {
-            let curve = self.raised_edge(face, corner);
+            let curve = self.raised_edge(face, corner, raise_quartic_to_septic);
             for (s, point) in curve.into_iter().enumerate() {
                 net[boundary_index(DEGREE, corner, s)] = point;
             }
@@ -81,15 +82,43 @@ impl PatchesView<'_> {
         net
     }
 
-    /// The raised curve of the edge from `corner` to the next one.
-    fn raised_edge(&self, face: usize, corner: usize) -> [Vec3; DEGREE + 1] {
+    /// Degree of the patches, 6 or 7.
+    pub fn degree(&self) -> usize {
+        self.meta.first().map_or(DEGREE, |meta| meta.degree as usize)
+    }
+
+    /// The net of `face` of the patches' own degree, in storage order: 28 or 36 points. Those of
+    /// neighbours carry the same bits along their shared edge too.
+    pub fn own_net(&self, face: usize) -> Vec<Vec3> {
+        if self.degree() != 6 {
+            return self.net(face).to_vec();
+        }
+        let mut net = [Vec3::zeros(); N_SEXTIC];
+        for corner in 0..3 {
+            let curve = self.raised_edge(face, corner, raise_quartic_to_sextic);
+            for (s, point) in curve.into_iter().enumerate() {
+                net[boundary_index(6, corner, s)] = point;
+            }
+        }
+        let row = &self.interior[face];
+        let interior = |i: usize| Vec3::new(row[3 * i], row[3 * i + 1], row[3 * i + 2]);
+        lower_to_sextic(net, &std::array::from_fn(interior)).to_vec()
+    }
+
+    /// The curve of the edge from `corner` to the next one, raised.
+    fn raised_edge<const N: usize>(
+        &self,
+        face: usize,
+        corner: usize,
+        raise: impl Fn(&[Vec3; 5]) -> [Vec3; N],
+    ) -> [Vec3; N] {
         let from = self.face[face][corner] as usize;
         let to = self.face[face][(corner + 1) % 3] as usize;
         let inner = &self.boundary[self.edge_of[3 * face + corner] as usize];
         let at = |k: usize| Vec3::new(inner[3 * k], inner[3 * k + 1], inner[3 * k + 2]);
         let end = |v: usize| Vec3::from(self.position[v]);
         let (low, high) = (from.min(to), from.max(to));
-        let mut curve = raise_quartic_to_septic(&[end(low), at(0), at(1), at(2), end(high)]);
+        let mut curve = raise(&[end(low), at(0), at(1), at(2), end(high)]);
         if from > to {
             curve.reverse();
         }

@@ -1,5 +1,5 @@
-//! Writes a ball and a ring, whole and with a hole in the ball, in every format into a folder: food
-//! for foreign readers.
+//! Writes a ball and a ring, whole, with a hole in the ball and of degree 6, in every format into a
+//! folder: food for foreign readers.
 //!
 //! `cargo run -p isospline-export --example sample_exports -- FOLDER`
 
@@ -14,9 +14,12 @@ use std::path::{Path, PathBuf};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("name a folder to write into")?);
-    for (name, patches) in
-        [("sample", sample::ball_and_ring()), ("hollow", sample::hollow_ball_and_ring())]
-    {
+    let samples = [
+        ("sample", sample::ball_and_ring()),
+        ("hollow", sample::hollow_ball_and_ring()),
+        ("sextic", sample::of_degree_six(sample::hollow_ball_and_ring())),
+    ];
+    for (name, patches) in samples {
         write_all(&folder, name, &patches)?;
     }
     Ok(())

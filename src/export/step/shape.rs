@@ -1,22 +1,21 @@
 //! Points, curves, surfaces and the topology that joins them.
 
 use super::StepOptions;
-use super::layout::{CurveNumbers, INNER, Layout};
+use super::layout::{CurveNumbers, Layout};
 use super::text::{Entities, Real, References};
 use crate::ExportError;
-use crate::quads::{Corners, QuadMap, SIDE, halves};
+use crate::quads::{Corners, QuadMap, halves};
 use isospline_artifact::kinds::PatchesView;
 use isospline_geometry::Vec3;
-use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index, evaluate};
+use isospline_geometry::bezier_triangle::{boundary_index, evaluate};
 
-/// Knots of one polynomial span of degree 7.
-const KNOTS: &str = "(8,8)";
 const SPAN: &str = "(0.,1.)";
 
 /// The surface on its way into a file.
 pub(super) struct Shape<'p> {
     patches: &'p PatchesView<'p>,
     options: StepOptions,
+    degree: usize,
     layout: Layout,
     maps: Vec<QuadMap>,
     /// Of each edge, the half-edges that run up and down the vertex numbers.
@@ -32,7 +31,8 @@ struct Side {
     forward: bool,
 }
 
-type Net = [[u64; SIDE]; SIDE];
+/// Numbers of the control points of a quad, `[i][j]`.
+type Net = Vec<Vec<u64>>;
 
 impl<'p> Shape<'p> {
     /// Writes what all faces share and lays out the rest.
@@ -46,15 +46,16 @@ impl<'p> Shape<'p> {
             write_lines(entities)?;
         }
         let (n_vertices, n_edges) = (patches.position.len(), patches.boundary.len());
-        let layout = Layout::new(options, entities.next(), n_vertices, n_edges);
+        let degree = patches.degree();
+        let layout = Layout::new(options, degree, entities.next(), n_vertices, n_edges);
         let corners: Vec<Corners> = if options.compact {
             vec![Corners::collapsed()]
         } else {
             (0..3).map(Corners::at_corner).collect()
         };
-        let maps = corners.iter().map(QuadMap::new).collect();
+        let maps = corners.iter().map(|corners| QuadMap::new(degree, corners)).collect();
         let half_edges = half_edges(patches);
-        Ok(Self { patches, options, layout, maps, half_edges, lines })
+        Ok(Self { patches, options, degree, layout, maps, half_edges, lines })
     }
 
     /// Numbers of the faces that triangle `f` becomes.
@@ -75,7 +76,7 @@ impl<'p> Shape<'p> {
 
     pub(super) fn write_faces(&self, entities: &mut Entities<'_>) -> Result<(), ExportError> {
         (0..self.patches.face.len()).try_for_each(|f| {
-            let net = self.patches.net(f);
+            let net = self.patches.own_net(f);
             if self.options.compact {
                 return self.write_compact(entities, f, &net);
             }
@@ -88,18 +89,19 @@ impl<'p> Shape<'p> {
         debug_assert_eq!(entities.next(), self.layout.edge(e));
         let half_edge = self.half_edges[e][0] as usize;
         let (f, corner) = (half_edge / 3, half_edge % 3);
-        let net = self.patches.net(f);
-        let curve: [Vec3; SIDE] = std::array::from_fn(|s| net[boundary_index(DEGREE, corner, s)]);
+        let net = self.patches.own_net(f);
+        let n = self.degree;
+        let curve: Vec<Vec3> = (0..=n).map(|s| net[boundary_index(n, corner, s)]).collect();
         let face = self.patches.face[f];
         let [low, high] = [corner, (corner + 1) % 3].map(|k| self.layout.point(face[k] as usize));
         if self.options.compact {
-            write_points(entities, &curve[1..DEGREE])?;
+            write_points(entities, &curve[1..n])?;
             let numbers = self.layout.whole(e);
             return self.write_curve(entities, numbers, [low, high], || self.whole_pcurves(e));
         }
         let [first, second] = halves(&curve);
-        write_points(entities, &first[1..DEGREE])?;
-        write_points(entities, &second[1..DEGREE])?;
+        write_points(entities, &first[1..n])?;
+        write_points(entities, &second[1..n])?;
         write_vertex(entities, second[0])?;
         let middle = self.layout.middle(e);
         for (half, ends) in [[low, middle], [middle, high]].into_iter().enumerate() {
@@ -114,12 +116,13 @@ impl<'p> Shape<'p> {
         &self,
         entities: &mut Entities<'_>,
         f: usize,
-        net: &[Vec3; N_CONTROL],
+        net: &[Vec3],
     ) -> Result<(), ExportError> {
         debug_assert_eq!(entities.next(), self.layout.centre(f));
-        write_vertex(entities, evaluate(DEGREE, net, [1.0 / 3.0; 3]))?;
+        write_vertex(entities, evaluate(self.degree, net, [1.0 / 3.0; 3]))?;
         for map in &self.maps {
-            let inner: Vec<Vec3> = (1..DEGREE).map(|j| map.point(net, DEGREE, j)).collect();
+            let n = self.degree;
+            let inner: Vec<Vec3> = (1..n).map(|j| map.point(net, n, j)).collect();
             write_points(entities, &inner)?;
         }
         for corner in 0..3 {
@@ -139,7 +142,7 @@ impl<'p> Shape<'p> {
         entities: &mut Entities<'_>,
         f: usize,
         corner: usize,
-        net: &[Vec3; N_CONTROL],
+        net: &[Vec3],
     ) -> Result<(), ExportError> {
         let (quad, before) = (corner as u64, (corner + 2) % 3);
         debug_assert_eq!(entities.next(), self.layout.quad(f, quad));
@@ -153,12 +156,12 @@ impl<'p> Shape<'p> {
         let last = self.layout.half(to, u64::from(up_before));
         let spoke = self.layout.spoke(f, quad);
         let spoke_before = self.layout.spoke(f, before as u64);
-        let ids = net_of(
+        let ids = self.net_of(
             entities.next(),
-            chain(start, first, up, middle),
-            chain(middle, spoke, true, centre),
-            chain(middle_before, spoke_before, true, centre),
-            chain(start, last, !up_before, middle_before),
+            &self.chain(start, first, up, middle),
+            &self.chain(middle, spoke, true, centre),
+            &self.chain(middle_before, spoke_before, true, centre),
+            &self.chain(start, last, !up_before, middle_before),
         );
         let sides = [
             Side { edge: first.edge, forward: up },
@@ -173,19 +176,19 @@ impl<'p> Shape<'p> {
         &self,
         entities: &mut Entities<'_>,
         f: usize,
-        net: &[Vec3; N_CONTROL],
+        net: &[Vec3],
     ) -> Result<(), ExportError> {
         debug_assert_eq!(entities.next(), self.layout.quad(f, 0));
         let ends = self.patches.face[f].map(|v| self.layout.point(v as usize));
         let curves: [CurveNumbers; 3] =
             std::array::from_fn(|corner| self.layout.whole(self.edge(f, corner)));
         let up: [bool; 3] = std::array::from_fn(|corner| self.runs_up(f, corner));
-        let ids = net_of(
+        let ids = self.net_of(
             entities.next(),
-            chain(ends[0], curves[0], up[0], ends[1]),
-            chain(ends[1], curves[1], up[1], ends[2]),
-            chain(ends[0], curves[2], !up[2], ends[2]),
-            [ends[0]; SIDE],
+            &self.chain(ends[0], curves[0], up[0], ends[1]),
+            &self.chain(ends[1], curves[1], up[1], ends[2]),
+            &self.chain(ends[0], curves[2], !up[2], ends[2]),
+            &vec![ends[0]; self.degree + 1],
         );
         let sides: [Side; 3] =
             std::array::from_fn(|k| Side { edge: curves[k].edge, forward: up[k] });
@@ -197,20 +200,22 @@ impl<'p> Shape<'p> {
         &self,
         entities: &mut Entities<'_>,
         map: &QuadMap,
-        net: &[Vec3; N_CONTROL],
+        net: &[Vec3],
         ids: &Net,
         sides: &[Side],
     ) -> Result<(), ExportError> {
-        for i in 1..DEGREE {
-            let row: Vec<Vec3> = (1..DEGREE).map(|j| map.point(net, i, j)).collect();
+        let n = self.degree;
+        for i in 1..n {
+            let row: Vec<Vec3> = (1..n).map(|j| map.point(net, i, j)).collect();
             write_points(entities, &row)?;
         }
         let rows: Vec<String> =
             ids.iter().map(|row| format!("({})", References(row.iter().copied()))).collect();
         let surface = entities.add(format_args!(
-            "B_SPLINE_SURFACE_WITH_KNOTS('',7,7,({}),.UNSPECIFIED.,.F.,.F.,.F.,\
-             {KNOTS},{KNOTS},{SPAN},{SPAN},.UNSPECIFIED.)",
-            rows.join(",")
+            "B_SPLINE_SURFACE_WITH_KNOTS('',{n},{n},({}),.UNSPECIFIED.,.F.,.F.,.F.,\
+             {knots},{knots},{SPAN},{SPAN},.UNSPECIFIED.)",
+            rows.join(","),
+            knots = self.knots()
         ))?;
         if self.options.pcurves {
             for (k, side) in sides.iter().enumerate() {
@@ -238,10 +243,12 @@ impl<'p> Shape<'p> {
         [from, to]: [u64; 2],
         pcurves: impl Fn() -> [u64; 2],
     ) -> Result<(), ExportError> {
-        let points = chain(from, numbers, true, to);
+        let points = self.chain(from, numbers, true, to);
         let mut curve = entities.add(format_args!(
-            "B_SPLINE_CURVE_WITH_KNOTS('',7,({}),.UNSPECIFIED.,.F.,.F.,{KNOTS},{SPAN},.UNSPECIFIED.)",
-            References(points.into_iter())
+            "B_SPLINE_CURVE_WITH_KNOTS('',{},({}),.UNSPECIFIED.,.F.,.F.,{},{SPAN},.UNSPECIFIED.)",
+            self.degree,
+            References(points.into_iter()),
+            self.knots()
         ))?;
         if self.options.pcurves {
             let [a, b] = pcurves();
@@ -268,6 +275,41 @@ impl<'p> Shape<'p> {
         if half == 0 { [start(up), end(down)] } else { [end(up), start(down)] }
     }
 
+    /// Multiplicities of the knots of one polynomial span.
+    fn knots(&self) -> String {
+        format!("({order},{order})", order = self.degree + 1)
+    }
+
+    /// Numbers of the control points of a curve, against its direction if not `forward`.
+    fn chain(&self, from: u64, curve: CurveNumbers, forward: bool, to: u64) -> Vec<u64> {
+        let mut inner: Vec<u64> = (curve.inner..curve.inner + self.layout.inner).collect();
+        if !forward {
+            inner.reverse();
+        }
+        std::iter::once(from).chain(inner).chain([to]).collect()
+    }
+
+    /// Numbers of a net `c_ij` from its inner points and its four borders, at v = 0, u = 1, v = 1
+    /// and u = 0, each in ascending u or v.
+    fn net_of(
+        &self,
+        first_inner: u64,
+        bottom: &[u64],
+        right: &[u64],
+        top: &[u64],
+        left: &[u64],
+    ) -> Net {
+        let (n, inner) = (self.degree, self.layout.inner);
+        let number = |i: usize, j: usize| match (i, j) {
+            (_, 0) => bottom[i],
+            (_, j) if j == n => top[i],
+            (0, _) => left[j],
+            (i, _) if i == n => right[j],
+            _ => first_inner + inner * (i as u64 - 1) + j as u64 - 1,
+        };
+        (0..=n).map(|i| (0..=n).map(|j| number(i, j)).collect()).collect()
+    }
+
     fn edge(&self, f: usize, corner: usize) -> usize {
         self.patches.edge_of[3 * f + corner] as usize
     }
@@ -276,39 +318,6 @@ impl<'p> Shape<'p> {
         let face = self.patches.face[f];
         face[corner] < face[(corner + 1) % 3]
     }
-}
-
-/// Numbers of the eight control points of a curve, against its direction if not `forward`.
-fn chain(from: u64, curve: CurveNumbers, forward: bool, to: u64) -> [u64; SIDE] {
-    let mut inner: [u64; INNER as usize] = std::array::from_fn(|k| curve.inner + k as u64);
-    if !forward {
-        inner.reverse();
-    }
-    std::array::from_fn(|k| match k {
-        0 => from,
-        DEGREE => to,
-        _ => inner[k - 1],
-    })
-}
-
-/// Numbers of a net `c_ij` from its inner points and its four borders, at v = 0, u = 1, v = 1 and
-/// u = 0, each in ascending u or v.
-fn net_of(
-    first_inner: u64,
-    bottom: [u64; SIDE],
-    right: [u64; SIDE],
-    top: [u64; SIDE],
-    left: [u64; SIDE],
-) -> Net {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| match (i, j) {
-            (_, 0) => bottom[i],
-            (_, DEGREE) => top[i],
-            (0, _) => left[j],
-            (DEGREE, _) => right[j],
-            _ => first_inner + INNER * (i as u64 - 1) + j as u64 - 1,
-        })
-    })
 }
 
 fn write_points(entities: &mut Entities<'_>, points: &[Vec3]) -> Result<(), ExportError> {

@@ -2,10 +2,15 @@
 
 use super::{StepDefect, StepSummary, lint_step};
 use crate::{About, Format, LengthUnit, Options, StepOptions, StepSchema, sample, write};
+use isospline_artifact::kinds::Patches;
 
 fn text(options: &Options) -> String {
+    text_of(&sample::hollow_ball_and_ring(), options)
+}
+
+fn text_of(patches: &Patches, options: &Options) -> String {
     let mut out = Vec::new();
-    write(Format::Step, &sample::hollow_ball_and_ring().view(), options, &mut out).unwrap();
+    write(Format::Step, &patches.view(), options, &mut out).unwrap();
     String::from_utf8(out).unwrap()
 }
 
@@ -28,6 +33,23 @@ fn sound_files_of_every_form_pass_and_hold_what_was_written() {
             let ball = &found.shells[1..];
             assert!((ball[1].volume / ball[0].volume + 0.064).abs() < 1e-13);
         }
+    }
+}
+
+#[test]
+fn patches_of_degree_6_make_sound_files_three_quarters_the_size() {
+    for (compact, pcurves) in [(false, false), (false, true), (true, false), (true, true)] {
+        let step = StepOptions { compact, pcurves, ..StepOptions::default() };
+        let options = Options { step, ..Options::default() };
+        let septic = sample::hollow_ball_and_ring();
+        let sizes = [sample::of_degree_six(septic.clone()), septic].map(|patches| {
+            let text = text_of(&patches, &options);
+            let found = lint_step(&text).unwrap_or_else(|defects| panic!("{defects:?}"));
+            assert_eq!((found.solids, found.shells.len()), (2, 3));
+            text.len() as f64
+        });
+        let ratio = sizes[0] / sizes[1];
+        assert!(ratio > 0.7 && ratio < 0.85, "{ratio} of the size, compact {compact}");
     }
 }
 
