@@ -43,3 +43,12 @@ fn free_vertices_leave_the_surface_by_less_than_its_error_and_patches_stay_exact
     let ratio = number(&free, "rel_error_rms") / number(&bound, "rel_error_rms");
     assert!(ratio < 1.05, "{ratio}");
 }
+
+#[test]
+fn patches_of_degree_6_are_as_exact_and_nearly_as_near_with_three_quarters_of_the_points() {
+    let [septic, sextic] = [7, 6].map(|degree| checked(&[&format!("relax.degree={degree}")]));
+    assert_exact(&sextic);
+    let ratio = |key: &str| number(&sextic, key) / number(&septic, key);
+    assert!(ratio("rel_error_max") < 2.0, "{}", ratio("rel_error_max"));
+    assert!(ratio("rel_error_rms") < 3.0, "{}", ratio("rel_error_rms"));
+}

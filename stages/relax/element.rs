@@ -136,7 +136,7 @@ impl Equations<'_> {
         };
         let squares: Vec<[f64; 6]> = self.normal.iter().map(square).collect();
         let mut m = [[0.0; ALL]; ALL];
-        put_pairs(&mut m, &self.samples.pairs, &squares);
+        put_pairs(&mut m, self.samples, &squares);
         self.add_differences(&mut m);
         for (i, row) in m.iter_mut().enumerate() {
             row[i] += self.damping;
@@ -202,15 +202,13 @@ impl Equations<'_> {
 /// Puts into both triangles the sums over the samples of the weights of a pair of points times
 /// `[xx, xy, xz, yy, yz, zz]`.
 #[inline(always)]
-fn put_pairs(m: &mut [[f64; ALL]; ALL], pairs: &[Vec<[f64; LANES]>], squares: &[[f64; 6]]) {
+fn put_pairs(m: &mut [[f64; ALL]; ALL], samples: &Samples, squares: &[[f64; 6]]) {
     let places = places();
-    let mut all = (0..N_INTERIOR).flat_map(|i| (0..=i).map(move |j| (i, j)));
-    for weights in pairs {
+    for (weights, pairs) in samples.products.iter().zip(samples.pairs.chunks_exact(LANES)) {
         let sums = weighted_sums(weights, squares);
-        for lane in 0..LANES {
+        for (lane, pair) in pairs.iter().enumerate() {
             let [xx, xy, xz, yy, yz, zz] = sums.map(|sum| sum[lane]);
-            let (i, j) = all.next().expect("invariant: sums of as many pairs");
-            let (i, j) = (3 * places[i], 3 * places[j]);
+            let [i, j] = pair.map(|slot| 3 * places[slot]);
             let block = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
             for (r, row) in block.iter().enumerate() {
                 for (c, &x) in row.iter().enumerate() {

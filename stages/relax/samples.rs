@@ -22,9 +22,12 @@ const TILT: f64 = 0.985;
 pub(crate) struct Samples {
     /// Values of the interior points.
     pub(crate) inner: Vec<[f64; N_INTERIOR]>,
-    /// Products of the values of pairs `(i, j <= i)` of interior points, by rows, over the number
-    /// of samples: `[pair / LANES][sample][pair % LANES]`.
-    pub(crate) pairs: Vec<Vec<[f64; LANES]>>,
+    /// Pairs `[i, j <= i]` of interior points, the slots in use, by rows; filled up to whole lanes
+    /// with the last one.
+    pub(crate) pairs: Vec<[usize; 2]>,
+    /// Products of the values of each pair over the number of samples:
+    /// `[pair / LANES][sample][pair % LANES]`.
+    pub(crate) products: Vec<Vec<[f64; LANES]>>,
     /// Differences between samples.
     pub(crate) roughness: Roughness,
     /// The points at the samples, then two tangents, counter-clockwise, at every
@@ -54,8 +57,9 @@ impl Samples {
         let functionals = full.iter().copied().chain(tangents).collect::<Vec<_>>();
         let rim = places.iter().filter(is_rim).map(values).collect();
         let roughness = Roughness::new(steps, smoothness);
-        let (pairs, functionals) = (pairs(&inner), Functionals::new(&functionals));
-        Self { inner, pairs, roughness, functionals, rim, even: even(degree) }
+        let (pairs, functionals) = (pairs(degree), Functionals::new(&functionals));
+        let products = products(&inner, &pairs);
+        Self { inner, pairs, products, roughness, functionals, rim, even: even(degree) }
     }
 
     /// Samples of a patch.
@@ -118,13 +122,25 @@ fn combine(weights: &[f64; N_CONTROL], net: &[Vec3; N_CONTROL]) -> Vec3 {
     sum
 }
 
-fn pairs(inner: &[[f64; N_INTERIOR]]) -> Vec<Vec<[f64; LANES]>> {
+fn pairs(degree: Degree) -> Vec<[usize; 2]> {
+    let slots = degree.slots();
+    let used: Vec<usize> =
+        (0..N_INTERIOR).filter(|&i| slots.contains(&interior_indices()[i])).collect();
+    let rows = used.iter().enumerate();
+    let mut pairs: Vec<[usize; 2]> =
+        rows.flat_map(|(n, &i)| used[..=n].iter().map(move |&j| [i, j])).collect();
+    let last = pairs[pairs.len() - 1];
+    pairs.resize(pairs.len().next_multiple_of(LANES), last);
+    pairs
+}
+
+fn products(inner: &[[f64; N_INTERIOR]], pairs: &[[usize; 2]]) -> Vec<Vec<[f64; LANES]>> {
     let scale = 1.0 / inner.len() as f64;
-    let all: Vec<[usize; 2]> = (0..N_INTERIOR).flat_map(|i| (0..=i).map(move |j| [i, j])).collect();
     let product = |b: &[f64; N_INTERIOR], chunk: &[[usize; 2]]| {
         std::array::from_fn(|lane| scale * b[chunk[lane][0]] * b[chunk[lane][1]])
     };
-    all.chunks_exact(LANES).map(|chunk| inner.iter().map(|b| product(b, chunk)).collect()).collect()
+    let chunks = pairs.chunks_exact(LANES);
+    chunks.map(|chunk| inner.iter().map(|b| product(b, chunk)).collect()).collect()
 }
 
 /// The interior points of a net, each the mean of its six neighbours, from the boundary points.

@@ -74,7 +74,7 @@ def seen_points(surface, drawing):
     scale = drawing.size / 2 / drawing.half
     lengths = np.linalg.norm(surface.nets[:, 1:] - surface.nets[:, :1], axis=2).max(axis=1)
     for net, length in zip(surface.nets, lengths):
-        values, *directions = grid(int(np.ceil(2 * scale * length)))
+        values, *directions = grid(int(np.ceil(2 * scale * length)), surface.degree)
         net = (net - drawing.center) @ drawing.axes.T
         position, along, across = values @ net, directions[0] @ net, directions[1] @ net
         columns = np.floor(drawing.size / 2 + scale * position[:, 0]).astype(int)
@@ -85,11 +85,11 @@ def seen_points(surface, drawing):
 
 
 @functools.cache
-def grid(steps):
+def grid(steps, degree):
     """Bernstein values and slopes at the points of a triangular grid."""
     places = [(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)]
     points = np.array(places) / steps
-    return bernstein(points), slopes(points, 1), slopes(points, 2)
+    return bernstein(points, degree), slopes(points, 1, degree), slopes(points, 2, degree)
 
 
 def around(mask, join):

@@ -12,8 +12,8 @@ TOLERANCE = 1e-4
 STEPS = 12
 
 points = [(i, j, STEPS - i - j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]
-weights = bernstein(np.array(points) / STEPS)
 for surface in surfaces():
+    weights = bernstein(np.array(points) / STEPS, surface.degree)
     path = surface.beside("ply")
     reader = vtkPLYReader()
     reader.SetFileName(str(path))
