@@ -129,6 +129,22 @@ fn refined_uneven_meshes_converge_with_order_seven_and_their_normals_with_order_
 }
 
 #[test]
+fn tiles_end_where_one_solve_of_the_whole_surface_ends() {
+    // Six rings about a vertex are all of this surface.
+    let [tiles, whole] = ["2", "6"].map(|rings| {
+        let sandbox = Sandbox::new();
+        let tile = format!("relax.tile={rings}");
+        let sets = ["--set", "target.fit=full", "--set", "relax.sweeps=100", "--set", &tile];
+        sandbox.converts("sphere_80", &sets);
+        sandbox.checked()
+    });
+    for figure in ["rel_error_max", "rel_error_rms"] {
+        let ratio = number(&tiles, figure) / number(&whole, figure);
+        assert!(ratio > 0.5 && ratio < 1.5, "{figure}: {ratio}");
+    }
+}
+
+#[test]
 fn the_curves_of_the_paper_are_not_relaxed() {
     let sandbox = Sandbox::new();
     sandbox.converts("sphere_80", &["--set", "network.method=\"paper\""]);

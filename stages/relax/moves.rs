@@ -16,9 +16,9 @@
 //! faces about them and no other.
 //!
 //! *Degree 6* [derived]. The same moves of spokes; of the rows beside an edge one combination is
-//! free, three moves in place of six; and `mu1` of both ends and `nu` are tied by one equation an
-//! edge (src/fitting/sextic_edge.rs), so that 13 moves a face remain of 14.5. Moves of single
-//! spokes do not keep the ties.
+//! free, three moves in place of six, and there is one innermost point; `mu1` of both ends and `nu`
+//! are tied by one equation an edge (`isospline_fitting::sextic_edge`). That makes 10.5 moves a face:
+//! 12, which are not free of each other, less 1.5 ties.
 //
 // symbols: q control points of a curve, p and r first inner rows left and right of an edge
 

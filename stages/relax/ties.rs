@@ -154,7 +154,9 @@ impl Ties {
     fn transposed(&self, y: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.n_moves];
         for (row, y) in self.rows.iter().zip(y) {
-            row.iter().for_each(|&(at, x)| out[at] += x * y);
+            for &(at, x) in row {
+                out[at] += x * y;
+            }
         }
         out
     }

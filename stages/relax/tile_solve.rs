@@ -75,7 +75,7 @@ impl Problem<'_> {
         }
         let numbering = Numbering::new(&self.mesh, tile, self.degree);
         let ties = TileTie::all(&self.mesh, &self.moves.ties, &at.gap, tile, &numbering);
-        let visit = Visit { numbering, ties, tile, faces, interior, here };
+        let visit = Visit { tile, numbering, ties, faces, interior, here };
         let unfolded = (visit.here.unsound > 0).then(|| self.unfolded(&visit, damping)).flatten();
         unfolded.unwrap_or_else(|| self.nearer(&visit, idle))
     }
