@@ -23,7 +23,7 @@ LIT = 160
 # Part of the pixels seen that may be astray; a border three pixels wide is not judged.
 MOST_ASTRAY = 0.002
 # The samples of export/sample.rs: their patches meet at an angle, which is to be seen.
-CREASED = {"sample", "hollow"}
+CREASED = {"sample", "hollow", "sextic"}
 # By which sign each damage is found.
 DAMAGES = {
     "facets": "uneven",
