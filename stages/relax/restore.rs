@@ -35,23 +35,11 @@ impl Conditions<'_> {
         nu: &[f64],
     ) -> Counters {
         let mut counters = Counters::default();
-        let twist = |h: HalfEdge| row_point(surface, h, 1);
-        let stars = map(host, self.mesh.position.len(), |v| self.vertex(&twist, v));
-        let mut weights = self.vertices.weights.to_vec();
-        for (v, star) in stars.into_iter().enumerate() {
-            // Twists without a solution stay where the moves, exact up to rounding, left them.
-            let Some(star) = star else {
-                counters.repair("vertices_not_restored", 1);
-                continue;
-            };
-            counters.max("vertex_residual_max", star.residual);
-            let first = self.mesh.star_first[v] as usize;
-            for (i, (twist, mu1)) in star.twists.into_iter().zip(star.mu1).enumerate() {
-                let h = HalfEdge(self.mesh.star[first + i]);
-                surface[h.face() as usize][first_inner_slot(h.corner() as usize, 1)] = twist;
-                weights[first + i][2] = mu1;
-            }
-        }
+        let twist = |surface: &[Interior], h| row_point(surface, h, 1);
+        let put = |surface: &mut [Interior], h: HalfEdge, twist| {
+            surface[h.face() as usize][first_inner_slot(h.corner() as usize, 1)] = twist;
+        };
+        let weights = self.restore_twists(host, surface, twist, put, &mut counters);
         let rows = map(host, self.mesh.edge.len(), |e| self.edge(surface, &weights, nu[e], e));
         for (e, rows) in rows.into_iter().enumerate() {
             counters.max("edge_residual_max", rows.residual);
@@ -68,13 +56,36 @@ impl Conditions<'_> {
         counters
     }
 
-    /// The twists of a vertex moved least onto its rows; `twist` is that of the face of an outgoing
-    /// half-edge, of degree 7, in model units.
-    pub(crate) fn vertex(
+    /// Moves the twists least onto the rows k = 1 and returns `[lambda0, mu0, mu1]` in star order;
+    /// `twist` reads that of the face of a half-edge, of degree 7, in model units, `put` writes it.
+    pub(crate) fn restore_twists(
         &self,
-        twist: &impl Fn(HalfEdge) -> Vec3,
-        vertex: usize,
-    ) -> Option<RestoredStar> {
+        host: &dyn Host,
+        surface: &mut [Interior],
+        twist: impl Fn(&[Interior], HalfEdge) -> Vec3 + Sync,
+        put: impl Fn(&mut [Interior], HalfEdge, Vec3),
+        counters: &mut Counters,
+    ) -> Vec<[f64; 3]> {
+        let n_vertices = self.mesh.position.len();
+        let stars = map(host, n_vertices, |v| self.vertex(|h| twist(surface, h), v));
+        let mut weights = self.vertices.weights.to_vec();
+        for (v, star) in stars.into_iter().enumerate() {
+            // Twists without a solution stay where the moves, exact up to rounding, left them.
+            let Some(star) = star else {
+                counters.repair("vertices_not_restored", 1);
+                continue;
+            };
+            counters.max("vertex_residual_max", star.residual);
+            let first = self.mesh.star_first[v] as usize;
+            for (i, (twist, mu1)) in star.twists.into_iter().zip(star.mu1).enumerate() {
+                put(surface, HalfEdge(self.mesh.star[first + i]), twist);
+                weights[first + i][2] = mu1;
+            }
+        }
+        weights
+    }
+
+    fn vertex(&self, twist: impl Fn(HalfEdge) -> Vec3, vertex: usize) -> Option<RestoredStar> {
         let star = Star::new(&self.mesh, &self.curvature, &self.network, twist, vertex);
         let mut solver = Solver::default();
         solver.solve(&star)?;
@@ -96,10 +107,10 @@ impl Conditions<'_> {
 }
 
 /// Twists and `mu1` of a vertex, counter-clockwise.
-pub(crate) struct RestoredStar {
-    pub(crate) twists: Vec<Vec3>,
-    pub(crate) mu1: Vec<f64>,
-    pub(crate) residual: f64,
+struct RestoredStar {
+    twists: Vec<Vec3>,
+    mu1: Vec<f64>,
+    residual: f64,
 }
 
 /// First inner rows of an edge.

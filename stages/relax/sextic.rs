@@ -1,10 +1,10 @@
 //! Patches of degree 6: from those of degree 7 that the stages before made, back onto the exact
 //! conditions, and raised to degree 7 at the end.
 //!
-//! Twists have the same mixed derivatives in both degrees, `42 (b - ..) = 30 (b' - ..)`, so the
-//! systems of the vertices are shared.
+//! A patch of degree 6 and the same one raised to degree 7 have one mixed derivative at a corner, so
+//! the systems of the vertices, which are those of degree 7, serve both.
 //
-// symbols: t5 = (4, 1, 1) and t6 = (5, 1, 1), the twists of degree 6 and 7
+// symbols: t5 = b'(4, 1, 1) and t6 = b(5, 1, 1), the twists of degree 6 and 7
 
 use crate::degree::{Degree, sextic_step};
 use crate::moves::Moves;
@@ -93,23 +93,11 @@ impl Conditions<'_> {
         surface: &mut [Interior],
         counters: &mut Counters,
     ) -> Vec<[f64; 3]> {
-        let twist = |h: HalfEdge| self.septic_twist(h, at(surface, h, 1));
-        let stars = map(host, self.mesh.position.len(), |v| self.vertex(&twist, v));
-        let mut weights = self.vertices.weights.to_vec();
-        for (v, star) in stars.into_iter().enumerate() {
-            let Some(star) = star else {
-                counters.repair("vertices_not_restored", 1);
-                continue;
-            };
-            counters.max("vertex_residual_max", star.residual);
-            let first = self.mesh.star_first[v] as usize;
-            for (i, (twist, mu1)) in star.twists.into_iter().zip(star.mu1).enumerate() {
-                let h = HalfEdge(self.mesh.star[first + i]);
-                *at_mut(surface, h, 1) = self.sextic_twist(h, twist);
-                weights[first + i][2] = mu1;
-            }
-        }
-        weights
+        let twist = |surface: &[Interior], h| self.septic_twist(h, at(surface, h, 1));
+        let put = |surface: &mut [Interior], h, twist| {
+            *at_mut(surface, h, 1) = self.sextic_twist(h, twist);
+        };
+        self.restore_twists(host, surface, twist, put, counters)
     }
 
     fn shift_twists(&self, surface: &mut [Interior], moves: &Moves, amounts: &[f64]) {
