@@ -8,12 +8,13 @@ mod edits;
 
 use crate::triangle_mesh::{BORDER, Defect};
 use crate::{HalfEdge, TriangleMesh, Vec3};
+use std::ops::Range;
 
 /// Marks rows of removed faces and vertices.
 pub const GONE: u32 = u32::MAX;
 
 /// A triangle mesh under edit; vertex and face ids stay valid until [`Self::compact`].
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct EditMesh {
     /// Vertex positions; rows of removed vertices keep their last value.
     pub positions: Vec<Vec3>,
@@ -23,9 +24,23 @@ pub struct EditMesh {
     outgoing: Vec<u32>,
     n_faces: usize,
     n_vertices: usize,
-    /// Scratch of the link condition: a vertex is marked if its entry equals `stamp`.
-    mark: Vec<u32>,
-    stamp: u32,
+}
+
+impl Clone for EditMesh {
+    fn clone(&self) -> Self {
+        let (positions, faces) = (self.positions.clone(), self.faces.clone());
+        let (opposite, outgoing) = (self.opposite.clone(), self.outgoing.clone());
+        Self { positions, faces, opposite, outgoing, ..*self }
+    }
+
+    // Without new memory, whose first touch costs more than the copy.
+    fn clone_from(&mut self, other: &Self) {
+        self.positions.clone_from(&other.positions);
+        self.faces.clone_from(&other.faces);
+        self.opposite.clone_from(&other.opposite);
+        self.outgoing.clone_from(&other.outgoing);
+        (self.n_faces, self.n_vertices) = (other.n_faces, other.n_vertices);
+    }
 }
 
 impl EditMesh {
@@ -60,8 +75,7 @@ impl EditMesh {
             }
         }
         let (n_faces, n_vertices) = (faces.len(), positions.len());
-        let mark = vec![0; n_vertices];
-        Self { positions, faces, opposite, outgoing, n_faces, n_vertices, mark, stamp: 0 }
+        Self { positions, faces, opposite, outgoing, n_faces, n_vertices }
     }
 
     /// The mesh without holes; vertices and faces keep their order.
@@ -117,12 +131,14 @@ impl EditMesh {
         (0..self.opposite.len() as u32).map(HalfEdge).filter(|&h| h.0 < self.opposite[h.row()])
     }
 
-    /// [`Self::edges`] as a list. Every other half-edge passes, and which is random: without a
-    /// branch that costs a fifth of the time.
-    pub fn edge_list(&self) -> Vec<HalfEdge> {
-        let mut edges = vec![HalfEdge(0); self.opposite.len() + 1];
+    /// Those of [`Self::edges`] that some face rows hold, as a list. Every other half-edge passes,
+    /// and which is random: without a branch that costs a fifth of the time.
+    pub fn edge_list(&self, faces: Range<usize>) -> Vec<HalfEdge> {
+        let mut edges = vec![HalfEdge(0); 3 * faces.len() + 1];
         let mut n_edges = 0;
-        for (h, &opposite) in (0u32..).zip(&self.opposite) {
+        for (h, &opposite) in
+            (3 * faces.start as u32..).zip(&self.opposite[3 * faces.start..3 * faces.end])
+        {
             edges[n_edges] = HalfEdge(h);
             n_edges += usize::from(h < opposite);
         }

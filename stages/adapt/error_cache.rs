@@ -1,11 +1,17 @@
-//! Curve errors of all edges, computed anew only where the mesh has changed.
+//! Curve errors of edges, computed anew only where the mesh has changed.
 
 use crate::curve_error::{JudgedEdge, Measure};
 use crate::surface_mesh::SurfaceMesh;
 use isospline_geometry::HalfEdge;
+use isospline_stage::{Serial, map};
 
 /// An edge with the error of its curve, in model units.
 pub(crate) type EdgeError = (HalfEdge, f64);
+
+/// Faces whose edges are looked at in a task.
+const FACES_A_TASK: usize = 512;
+/// Diagonals judged in a task.
+const DIAGONALS_A_TASK: usize = 128;
 
 /// Errors of the curves of a mesh's edges and of the diagonals that flips would give.
 ///
@@ -20,82 +26,157 @@ pub(crate) struct ErrorCache {
 impl ErrorCache {
     /// Each edge with the error of its own curve.
     pub(crate) fn edges(&mut self, surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
-        self.own.update(
-            surface,
-            |_| true,
-            |h| ([surface.mesh.origin(h), surface.mesh.target(h)], surface.wings(h)),
-        )
+        self.own.grow(surface);
+        let n_faces = surface.mesh.face_rows();
+        let rows = &self.own;
+        let found = map(surface.host, n_faces.div_ceil(FACES_A_TASK), |task| {
+            let first = task * FACES_A_TASK;
+            let edges = surface.mesh.edge_list(first..(first + FACES_A_TASK).min(n_faces));
+            rows.look(surface, edges, |_| true, own_pair)
+        });
+        let mut edges = Vec::with_capacity(surface.mesh.face_count() * 3 / 2 + 1);
+        for look in found {
+            edges.extend_from_slice(&look.edges);
+            self.own.take(surface, look);
+        }
+        edges
     }
 
-    /// Each edge with the error of the curve between the vertices opposite to it, at a border its
-    /// own: the same edges in the same order as [`Self::edges`]. Infinite for those that are not
-    /// `wanted`, unless known.
+    /// The errors of the curves between the vertices opposite to edges, at a border of their own.
+    /// Infinite for those that are not `wanted`, unless known.
     pub(crate) fn diagonals(
         &mut self,
         surface: &SurfaceMesh<'_>,
-        wanted: impl Fn(HalfEdge) -> bool,
-    ) -> Vec<EdgeError> {
-        self.diagonal.update(surface, wanted, |h| {
-            let own = [surface.mesh.origin(h), surface.mesh.target(h)];
-            match surface.wings(h) {
-                // Seen from the left wing, the target of h lies to the left.
-                Some(wings) => (wings, Some([own[1], own[0]])),
-                None => (own, None),
-            }
-        })
+        edges: &[HalfEdge],
+        wanted: impl Fn(HalfEdge) -> bool + Sync,
+    ) -> Vec<f64> {
+        self.diagonal.grow(surface);
+        let tasks: Vec<_> = edges.chunks(DIAGONALS_A_TASK).collect();
+        let rows = &self.diagonal;
+        let found = map(surface.host, tasks.len(), |task| {
+            rows.look(surface, tasks[task].to_vec(), &wanted, diagonal_pair)
+        });
+        let mut errors = Vec::with_capacity(edges.len());
+        for look in found {
+            errors.extend(look.edges.iter().map(|&(_, error)| error));
+            self.diagonal.take(surface, look);
+        }
+        errors
+    }
+
+    /// What [`Self::diagonals`] said of an edge, if nothing beside it has changed since.
+    pub(crate) fn known_diagonal(&self, surface: &SurfaceMesh<'_>, h: HalfEdge) -> Option<f64> {
+        self.diagonal.known(surface, h)
     }
 }
 
 /// The ends of a curve and the vertices on its left and right.
 type Pair = ([u32; 2], Option<[u32; 2]>);
 
+fn own_pair(surface: &SurfaceMesh<'_>, h: HalfEdge) -> Pair {
+    ([surface.mesh.origin(h), surface.mesh.target(h)], surface.wings(h))
+}
+
+fn diagonal_pair(surface: &SurfaceMesh<'_>, h: HalfEdge) -> Pair {
+    let own = [surface.mesh.origin(h), surface.mesh.target(h)];
+    match surface.wings(h) {
+        // Seen from the left wing, the target of h lies to the left.
+        Some(wings) => (wings, Some([own[1], own[0]])),
+        None => (own, None),
+    }
+}
+
+/// The vertices that an error depends on and how often they had moved.
+type Key = [u32; 5];
+
+/// The key of what is not known.
+const NO_KEY: Key = [u32::MAX; 5];
+
 /// Errors of the curves between pairs of vertices, one pair a half-edge row.
 #[derive(Debug, Default)]
 struct Rows {
-    /// The vertices that the error depends on and how often they had moved.
-    keys: Vec<[u32; 5]>,
+    keys: Vec<Key>,
     errors: Vec<f64>,
+    /// When each row was looked at last; 0 is before all.
+    seen: Vec<u32>,
+}
+
+/// What was found of some edges.
+struct Look {
+    edges: Vec<EdgeError>,
+    /// Places in the list of those that are new, with their keys.
+    new: Vec<(u32, Key)>,
 }
 
 impl Rows {
-    fn update(
-        &mut self,
-        surface: &SurfaceMesh<'_>,
-        wanted: impl Fn(HalfEdge) -> bool,
-        pair: impl Fn(HalfEdge) -> Pair,
-    ) -> Vec<EdgeError> {
+    fn grow(&mut self, surface: &SurfaceMesh<'_>) {
         let rows = 3 * surface.mesh.face_rows();
-        self.keys.resize(rows, [u32::MAX; 5]);
+        self.keys.resize(rows, NO_KEY);
         self.errors.resize(rows, 0.0);
-        let mut edges = Vec::with_capacity(surface.mesh.face_count() * 3 / 2 + 1);
-        let mut stale = Vec::new();
-        let mut judged: Vec<JudgedEdge<'_>> = Vec::new();
-        let moves = |v: u32| surface.moves[v as usize];
-        for h in surface.mesh.edge_list() {
-            let ([a, b], wings) = pair(h);
-            let mut key = [a, b, u32::MAX, u32::MAX, moves(a) + moves(b)];
+        self.seen.resize(rows, 0);
+    }
+
+    /// The error of a row, if the faces on both sides are as they were.
+    fn known(&self, surface: &SurfaceMesh<'_>, h: HalfEdge) -> Option<f64> {
+        let seen = *self.seen.get(h.row())?;
+        let is_same = |h: HalfEdge| surface.is_as_at(seen, h.face());
+        (is_same(h) && surface.mesh.opposite(h).is_none_or(is_same)).then(|| self.errors[h.row()])
+    }
+
+    fn look(
+        &self,
+        surface: &SurfaceMesh<'_>,
+        edges: Vec<HalfEdge>,
+        wanted: impl Fn(HalfEdge) -> bool,
+        pair: impl Fn(&SurfaceMesh<'_>, HalfEdge) -> Pair,
+    ) -> Look {
+        let mut look = Look { edges: Vec::with_capacity(edges.len()), new: Vec::new() };
+        let (mut judged, mut places) = (Vec::new(), Vec::new());
+        for (h, place) in edges.into_iter().zip(0u32..) {
+            if let Some(error) = self.known(surface, h) {
+                look.edges.push((h, error));
+                continue;
+            }
+            let (ends, wings) = pair(surface, h);
             // Curves of the paper leave along the chord whatever stands beside them.
             let wings = wings.filter(|_| matches!(surface.measure, Measure::Normal(_)));
-            if let Some([c, d]) = wings {
-                key = [a, b, c, d, key[4] + moves(c) + moves(d)];
+            let key = key(surface, ends, wings);
+            if self.keys[h.row()] == key {
+                look.edges.push((h, self.errors[h.row()]));
+                look.new.push((place, key));
+            } else if wanted(h) {
+                let at = |pair: [u32; 2]| pair.map(|v| surface.at(v));
+                judged.push(JudgedEdge { ends: at(ends), wings: wings.map(at) });
+                places.push(place);
+                look.edges.push((h, 0.0));
+                look.new.push((place, key));
+            } else {
+                look.edges.push((h, f64::INFINITY));
+                look.new.push((place, NO_KEY));
             }
-            if self.keys[h.row()] != key {
-                if !wanted(h) {
-                    edges.push((h, f64::INFINITY));
-                    continue;
-                }
-                self.keys[h.row()] = key;
-                stale.push(edges.len());
-                let wings = wings.map(|wings| wings.map(|v| surface.at(v)));
-                judged.push(JudgedEdge { ends: [surface.at(a), surface.at(b)], wings });
-            }
-            edges.push((h, self.errors[h.row()]));
         }
-        let found = surface.measure.errors(surface.field, surface.host, &judged);
-        for (at, error) in stale.into_iter().zip(found) {
-            edges[at].1 = error;
-            self.errors[edges[at].0.row()] = error;
+        let found = surface.measure.errors(surface.field, &Serial, &judged);
+        for (place, error) in places.into_iter().zip(found) {
+            look.edges[place as usize].1 = error;
         }
-        edges
+        look
+    }
+
+    fn take(&mut self, surface: &SurfaceMesh<'_>, look: Look) {
+        for (place, key) in look.new {
+            let (h, error) = look.edges[place as usize];
+            self.keys[h.row()] = key;
+            self.errors[h.row()] = error;
+            self.seen[h.row()] = surface.now();
+        }
+    }
+}
+
+fn key(surface: &SurfaceMesh<'_>, [a, b]: [u32; 2], wings: Option<[u32; 2]>) -> Key {
+    let moves = |v: u32| surface.moves[v as usize];
+    let ends = moves(a) + moves(b);
+    match wings {
+        Some([c, d]) => [a, b, c, d, ends + moves(c) + moves(d)],
+        None => [a, b, u32::MAX, u32::MAX, ends],
     }
 }

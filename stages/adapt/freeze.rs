@@ -1,6 +1,6 @@
 //! From a fit triangle mesh to the base mesh: order, adjacency, frames.
 
-use crate::order::in_front_order;
+use crate::order::{by_lowest, in_front_order};
 use isospline_artifact::kinds::{BaseMesh, Bounds, EdgeKind, Fan, Frame};
 use isospline_geometry::triangle_mesh::{BORDER, Defect};
 use isospline_geometry::{HalfEdge, TriangleMesh, Vec3};
@@ -113,16 +113,16 @@ impl Edges {
         let ends = |h: HalfEdge| [mesh.origin(h), mesh.origin(h.next())];
         let rising = |h: &HalfEdge| ends(*h)[0] < ends(*h)[1];
         let all = (0..opposite.len() as u32).map(HalfEdge);
-        let mut forward: Vec<HalfEdge> = all.filter(rising).collect();
-        forward.sort_unstable_by_key(|&h| ends(h));
+        let forward: Vec<([u32; 2], HalfEdge)> = all.filter(rising).map(|h| (ends(h), h)).collect();
+        let (_, forward) = by_lowest(mesh.positions.len(), &forward, |(ends, _)| ends[0]);
         let mut of_half = vec![0; opposite.len()];
-        for (e, h) in (0u32..).zip(&forward) {
+        for (e, (_, h)) in (0u32..).zip(&forward) {
             of_half[h.row()] = e;
             of_half[opposite[h.row()] as usize] = e;
         }
         Self {
-            ends: forward.iter().map(|&h| ends(h)).collect(),
-            halves: forward.iter().map(|h| [h.0, opposite[h.row()]]).collect(),
+            ends: forward.iter().map(|&(ends, _)| ends).collect(),
+            halves: forward.iter().map(|(_, h)| [h.0, opposite[h.row()]]).collect(),
             of_half,
         }
     }

@@ -8,7 +8,8 @@ use crate::surface_mesh::SurfaceMesh;
 use crate::vertex::Vertex;
 use isospline_geometry::HalfEdge;
 use isospline_stage::{Counters, Ctx, Serial, Stopped, map};
-use std::cmp::Ordering;
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
 
 /// A flip must make the curve of the edge this many times better.
 const FLIP_GAIN: f64 = 1.2;
@@ -27,6 +28,10 @@ const ROOM: f64 = 0.85;
 const PATIENCE: u32 = 2;
 /// Candidates judged in a task, of some ten curves each.
 const CANDIDATES_A_TASK: usize = 32;
+/// Candidates judged together at least: two tasks.
+const FEWEST_JUDGED: usize = 64;
+/// Edges whose diagonals are judged together at least.
+const FLIPS_AT_ONCE: usize = 1024;
 
 /// Flips, collapses where curves are good and splits where they are bad; keeps the best round.
 pub(crate) fn improve(
@@ -48,8 +53,7 @@ pub(crate) fn improve(
     };
     for round in 0..n_rounds {
         ctx.host.progress(u64::from(round), u64::from(n_rounds))?;
-        let others = cache.diagonals(surface, |h| keeps_shape(surface, h));
-        let flipped = flip_round(surface, &gate, &errors, &others);
+        let flipped = flip_round(surface, &gate, &errors, cache);
         if flipped > 0 {
             errors = cache.edges(surface);
         }
@@ -68,7 +72,8 @@ pub(crate) fn improve(
         errors = cache.edges(surface);
         let score = Score::of(&errors);
         if score < best_score && surface.mesh.face_count() <= n_faces.max(best.mesh.face_count()) {
-            (best, best_score, failures) = (surface.clone(), score, 0);
+            best.keep(surface);
+            (best_score, failures) = (score, 0);
             counters.merge(&std::mem::take(&mut edits));
         } else {
             failures += 1;
@@ -77,7 +82,7 @@ pub(crate) fn improve(
             break;
         }
     }
-    *surface = best;
+    surface.go_back_to(best);
     Ok(())
 }
 
@@ -147,25 +152,36 @@ fn flip_round(
     surface: &mut SurfaceMesh<'_>,
     gate: &Gate,
     errors: &[EdgeError],
-    others: &[EdgeError],
+    cache: &mut ErrorCache,
 ) -> u64 {
-    let pairs = errors.iter().zip(others);
-    let gains = pairs.filter(|((_, now), (_, then))| FLIP_GAIN * then < *now);
-    let mut gains: Vec<EdgeError> = gains.map(|(&edge, _)| edge).collect();
-    gains.sort_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
+    let gains = |now: f64, then: f64| FLIP_GAIN * then < now;
+    let may_gain =
+        |&&(h, now): &&EdgeError| cache.known_diagonal(surface, h).is_none_or(|d| gains(now, d));
+    let mut order: Vec<EdgeError> = errors.iter().filter(may_gain).copied().collect();
+    order.sort_unstable_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
     let mut touched = vec![false; surface.mesh.face_rows()];
     let mut n_flips = 0;
-    for (h, _) in gains {
-        let Some(o) = surface.mesh.opposite(h) else { continue };
-        let faces = [h.face() as usize, o.face() as usize];
-        if faces.iter().any(|&f| touched[f]) || !flip_is_good(surface, gate, h) {
-            continue;
+    // Batch by batch: a flip settles the edges about it, whose diagonals nobody asks for then.
+    for batch in order.chunks(FLIPS_AT_ONCE.max(order.len() / 32)) {
+        let is_free = |h: HalfEdge| {
+            let faces = [Some(h), surface.mesh.opposite(h)].into_iter().flatten();
+            faces.into_iter().all(|h| !touched[h.face() as usize])
+        };
+        let open: Vec<EdgeError> = batch.iter().filter(|&&(h, _)| is_free(h)).copied().collect();
+        let halves: Vec<HalfEdge> = open.iter().map(|&(h, _)| h).collect();
+        let others = cache.diagonals(surface, &halves, |h| keeps_shape(surface, h));
+        for ((h, now), then) in open.into_iter().zip(others) {
+            let Some(o) = surface.mesh.opposite(h) else { continue };
+            let faces = [h.face() as usize, o.face() as usize];
+            let is_free = !faces.iter().any(|&f| touched[f]);
+            if gains(now, then) && is_free && flip_is_good(surface, gate, h) {
+                surface.flip(h);
+                for f in faces {
+                    touched[f] = true;
+                }
+                n_flips += 1;
+            }
         }
-        surface.mesh.flip(h);
-        for f in faces {
-            touched[f] = true;
-        }
-        n_flips += 1;
     }
     n_flips
 }
@@ -198,68 +214,117 @@ fn collapse_round(
     (limit, n_wanted): (f64, usize),
 ) -> u64 {
     let candidates = collapse_candidates(surface, gate, errors, (limit, n_wanted));
-    let mut order: Vec<(f64, usize)> = merged_errors(surface, &candidates, limit);
-    order.retain(|&(e, _)| e < limit || limit == f64::INFINITY);
-    order.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+    let is_below = |error: f64| error < limit || limit == f64::INFINITY;
+    // The longest spoke tells of most candidates that they will not do.
+    let mut bounds = judged(surface, &candidates, |fan| vec![take_longest(fan)]);
+    bounds.retain(|rank| is_below(rank.error));
+    bounds.sort_unstable();
+    let mut bounds = bounds.as_slice();
+    let mut ranks = BinaryHeap::new();
     let mut touched = vec![false; surface.mesh.vertex_rows()];
     let mut n_collapsed = 0;
-    for (_, k) in order {
-        let (h, merged) = &candidates[k];
-        if n_collapsed == n_wanted as u64 || !surface.mesh.is_face(h.face()) {
+    while n_collapsed < n_wanted {
+        if bounds.first().is_none_or(|bound| ranks.peek().is_some_and(|Reverse(r)| r < bound)) {
+            let Some(Reverse(Rank { candidate, .. })) = ranks.pop() else { break };
+            let (h, merged) = &candidates[candidate];
+            n_collapsed += usize::from(collapsed(surface, gate, (*h, merged), &mut touched));
             continue;
         }
-        let around: Vec<u32> = ring(surface, *h).chain([surface.mesh.origin(*h)]).collect();
-        if around.iter().any(|&v| touched[v as usize]) {
-            continue;
-        }
-        // The surroundings are as they were, but the link condition may look beyond them.
-        if surface.collapse_is_better(gate, *h, merged, ROOM) {
-            for v in around {
-                touched[v as usize] = true;
-            }
-            touched[surface.mesh.target(*h) as usize] = true;
-            surface.collapse(*h, *merged);
-            n_collapsed += 1;
-        }
+        // The others are judged by all spokes when their turn may have come.
+        let n = FEWEST_JUDGED.max(n_wanted - n_collapsed).min(bounds.len());
+        let (batch, rest) = bounds.split_at(n);
+        bounds = rest;
+        let is_free = |bound: &&Rank| is_free(surface, candidates[bound.candidate].0, &touched);
+        let open: Vec<Rank> = batch.iter().filter(is_free).copied().collect();
+        let chosen: Vec<_> = open.iter().map(|bound| candidates[bound.candidate]).collect();
+        let others = judged(surface, &chosen, |fan| {
+            take_longest(fan);
+            std::mem::take(fan)
+        });
+        let whole = open.iter().zip(others).map(|(bound, rest)| Rank {
+            error: bound.error.max(rest.error),
+            candidate: bound.candidate,
+        });
+        ranks.extend(whole.filter(|rank| is_below(rank.error)).map(Reverse));
     }
-    n_collapsed
+    n_collapsed as u64
 }
 
-/// For each candidate the largest error of the curves that merging gives, and its place; of those
-/// that reach `limit` one such error.
-fn merged_errors(
-    surface: &SurfaceMesh<'_>,
-    candidates: &[(HalfEdge, Vertex)],
-    limit: f64,
-) -> Vec<(f64, usize)> {
+/// A candidate by the error of the curves that merging gives: the least first, then in their order.
+#[derive(Clone, Copy, Debug)]
+struct Rank {
+    error: f64,
+    candidate: usize,
+}
+
+impl Ord for Rank {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.error.total_cmp(&other.error).then(self.candidate.cmp(&other.candidate))
+    }
+}
+
+impl PartialOrd for Rank {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Rank {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Rank {}
+
+/// Merges an edge if nothing about it has changed and the gate bears it.
+fn collapsed(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    (h, merged): (HalfEdge, &Vertex),
+    touched: &mut [bool],
+) -> bool {
+    // The surroundings are as they were, but the link condition may look beyond them.
+    if !is_free(surface, h, touched) || !surface.collapse_is_better(gate, h, merged, ROOM) {
+        return false;
+    }
+    let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
+    for v in ring(surface, h).chain(ends) {
+        touched[v as usize] = true;
+    }
+    surface.collapse(h, *merged);
+    true
+}
+
+/// Whether an edge is there and nothing about it was touched.
+fn is_free(surface: &SurfaceMesh<'_>, h: HalfEdge, touched: &[bool]) -> bool {
+    surface.mesh.is_face(h.face())
+        && ring(surface, h).chain([surface.mesh.origin(h)]).all(|v| !touched[v as usize])
+}
+
+/// Of each candidate the largest error of those curves about the merged vertex that are picked;
+/// 0 if none are.
+fn judged<'s>(
+    surface: &'s SurfaceMesh<'_>,
+    candidates: &'s [(HalfEdge, Vertex)],
+    pick: impl Fn(&mut Vec<JudgedEdge<'s>>) -> Vec<JudgedEdge<'s>> + Sync,
+) -> Vec<Rank> {
     let tasks: Vec<_> = candidates.chunks(CANDIDATES_A_TASK).collect();
     let errors = map(surface.host, tasks.len(), |task| {
-        let fans = tasks[task].iter().map(|candidate| fan(surface, candidate)).collect();
-        merged_errors_of(surface, fans, limit)
-    });
-    errors.concat().into_iter().zip(0..).collect()
-}
-
-fn merged_errors_of(
-    surface: &SurfaceMesh<'_>,
-    mut fans: Vec<Vec<JudgedEdge<'_>>>,
-    limit: f64,
-) -> Vec<f64> {
-    let judge = |edges: &[JudgedEdge<'_>]| surface.measure.errors(surface.field, &Serial, edges);
-    // The longest spoke tells of most candidates that they will not do.
-    let longest: Vec<JudgedEdge<'_>> = fans.iter_mut().map(take_longest).collect();
-    let mut errors = judge(&longest);
-    let (mut owners, mut rest) = (Vec::new(), Vec::new());
-    for (k, fan) in fans.into_iter().enumerate() {
-        if errors[k] < limit || limit == f64::INFINITY {
-            rest.extend(fan);
-            owners.resize(rest.len(), k);
+        let (mut owners, mut edges) = (Vec::new(), Vec::new());
+        for (k, candidate) in tasks[task].iter().enumerate() {
+            edges.extend(pick(&mut fan(surface, candidate)));
+            owners.resize(edges.len(), k);
         }
-    }
-    for (k, error) in owners.into_iter().zip(judge(&rest)) {
-        errors[k] = errors[k].max(error);
-    }
-    errors
+        let mut errors = vec![0.0f64; tasks[task].len()];
+        let found = surface.measure.errors(surface.field, &Serial, &edges);
+        for (k, error) in owners.into_iter().zip(found) {
+            errors[k] = errors[k].max(error);
+        }
+        errors
+    });
+    let ranks = errors.concat().into_iter().enumerate();
+    ranks.map(|(candidate, error)| Rank { error, candidate }).collect()
 }
 
 /// The edges about a merged vertex.
@@ -279,7 +344,7 @@ fn take_longest<'s>(fan: &mut Vec<JudgedEdge<'s>>) -> JudgedEdge<'s> {
 
 /// Edges in the quietest places whose merging the gate bears, with the merged vertex.
 fn collapse_candidates(
-    surface: &mut SurfaceMesh<'_>,
+    surface: &SurfaceMesh<'_>,
     gate: &Gate,
     errors: &[EdgeError],
     (limit, n_wanted): (f64, usize),
@@ -300,14 +365,15 @@ fn collapse_candidates(
     let quiet = first_by(quiet, 6 * n_wanted + 32, |x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
     let middles: Vec<_> = quiet.iter().map(|&(h, _)| surface.middle(h)).collect();
     let merged = surface.feet(&middles);
-    let mut candidates = Vec::new();
-    for (&(h, _), merged) in quiet.iter().zip(&merged) {
-        let Some(merged) = merged else { continue };
-        if surface.collapse_is_better(gate, h, merged, ROOM) {
-            candidates.push((h, *merged));
-        }
-    }
-    candidates
+    let found: Vec<(HalfEdge, Vertex)> =
+        quiet.iter().zip(merged).filter_map(|(&(h, _), merged)| Some((h, merged?))).collect();
+    let tasks: Vec<_> = found.chunks(CANDIDATES_A_TASK).collect();
+    map(surface.host, tasks.len(), |task| {
+        let is_good =
+            |(h, merged): &&(HalfEdge, Vertex)| surface.collapse_is_better(gate, *h, merged, ROOM);
+        tasks[task].iter().filter(is_good).copied().collect::<Vec<_>>()
+    })
+    .concat()
 }
 
 /// The first `n` in order, sorted: most of a large mesh is never looked at.
@@ -338,28 +404,33 @@ fn split_round(
     n_room: usize,
 ) -> u64 {
     let bad = first_by(errors, 12 * n_room, |x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
-    let middles: Vec<_> = bad.iter().map(|&(h, _)| surface.middle(h)).collect();
-    let middles = surface.feet(&middles);
     let mut touched = vec![false; surface.mesh.vertex_rows()];
     let mut n_split = 0;
-    for (&(h, _), middle) in bad.iter().zip(&middles) {
-        let (Some(middle), Some(wings)) = (middle, surface.wings(h)) else { continue };
-        let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
-        let around = [ends[0], ends[1], wings[0], wings[1]];
-        if n_split == n_room as u64
-            || around.iter().any(|&v| touched.get(v as usize).copied().unwrap_or(true))
-            || !split_is_good(surface, gate, h, middle)
-        {
-            continue;
+    // Batch by batch: most of the later ones are not needed.
+    for batch in bad.chunks(2 * n_room.max(16)) {
+        if n_split == n_room {
+            break;
         }
-        if surface.split(h, *middle).is_some() {
-            for v in around {
-                touched[v as usize] = true;
+        let middles: Vec<_> = batch.iter().map(|&(h, _)| surface.middle(h)).collect();
+        for (&(h, _), middle) in batch.iter().zip(surface.feet(&middles)) {
+            let (Some(middle), Some(wings)) = (middle, surface.wings(h)) else { continue };
+            let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
+            let around = [ends[0], ends[1], wings[0], wings[1]];
+            if n_split == n_room
+                || around.iter().any(|&v| touched.get(v as usize).copied().unwrap_or(true))
+                || !split_is_good(surface, gate, h, &middle)
+            {
+                continue;
             }
-            n_split += 1;
+            if surface.split(h, middle).is_some() {
+                for v in around {
+                    touched[v as usize] = true;
+                }
+                n_split += 1;
+            }
         }
     }
-    n_split
+    n_split as u64
 }
 
 fn split_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge, middle: &Vertex) -> bool {

@@ -2,6 +2,7 @@
 
 use crate::gate::{Gate, slope, turning_deg};
 use crate::surface_mesh::SurfaceMesh;
+use crate::vertex::Vertex;
 use crate::{AdaptError, AdaptParams};
 use isospline_geometry::{HalfEdge, Vec3};
 use isospline_stage::{Counters, Ctx, map};
@@ -22,7 +23,11 @@ const GROWTH_FLOOR: usize = 4000;
 /// Rounds of the soft repair: what two passes of flips and slides do not mend, they never do.
 const SOFT_ROUNDS: u32 = 3;
 /// Faces judged in a task.
-const FACES_A_TASK: usize = 2048;
+const FACES_A_TASK: usize = 512;
+/// Faces for which edits are sought together, before any of them is made.
+const MENDS_AT_ONCE: usize = 128;
+/// Faces for which edits are sought in a task.
+const MENDS_A_TASK: usize = 16;
 
 /// Makes every face fit, by flips, slides and collapses where they help and by splits where not.
 ///
@@ -52,8 +57,12 @@ pub(crate) fn make_fit(
         for &face in &unfit {
             let still =
                 |s: &SurfaceMesh<'_>| s.mesh.is_face(face) && gate.face(&s.corners(face)) > 1.0;
-            if still(surface) && mend(surface, &gate, face, counters).is_none() {
-                split(surface, &gate, face, &mut split_near, counters);
+            if !still(surface) {
+                continue;
+            }
+            match mends(surface, &gate, &[face]).pop().flatten() {
+                Some(mend) => drop(mend.make(surface, counters)),
+                None => split(surface, &gate, face, &mut split_near, counters),
             }
         }
     }
@@ -71,17 +80,28 @@ pub(crate) fn soften(surface: &mut SurfaceMesh<'_>, params: &AdaptParams, counte
     let mut changed = vec![true; surface.mesh.vertex_rows()];
     for _ in 0..SOFT_ROUNDS {
         let before = std::mem::replace(&mut changed, vec![false; surface.mesh.vertex_rows()]);
-        for face in faces_above(surface, cost, SOFT) {
-            if !surface.mesh.is_face(face) || cost(surface, face) <= SOFT {
-                continue;
-            }
-            let is_new = |&v: &u32| before[v as usize] || changed[v as usize];
-            if !surface.mesh.face(face).iter().any(is_new) {
-                continue;
-            }
-            if let Some(center) = mend(surface, &gate, face, counters) {
-                changed[center as usize] = true;
-                surface.mesh.neighbours(center).for_each(|v| changed[v as usize] = true);
+        for batch in faces_above(surface, cost, SOFT).chunks(MENDS_AT_ONCE) {
+            let is_due = |s: &SurfaceMesh<'_>, changed: &[bool], face: u32| {
+                let is_new = |&v: &u32| before[v as usize] || changed[v as usize];
+                s.mesh.is_face(face) && cost(s, face) > SOFT && s.mesh.face(face).iter().any(is_new)
+            };
+            let time = surface.now();
+            let due: Vec<u32> =
+                batch.iter().copied().filter(|&f| is_due(surface, &changed, f)).collect();
+            let mut mends = mends(surface, &gate, &due).into_iter().zip(due).peekable();
+            for &face in batch {
+                let mend = mends.next_if(|&(_, of)| of == face).map(|(mend, _)| mend);
+                if !is_due(surface, &changed, face) {
+                    continue;
+                }
+                let mend = match mend {
+                    Some(mend) if is_as_at(surface, time, face) => mend,
+                    _ => self::mends(surface, &gate, &[face]).pop().flatten(),
+                };
+                if let Some(center) = mend.map(|mend| mend.make(surface, counters)) {
+                    changed[center as usize] = true;
+                    surface.mesh.neighbours(center).for_each(|v| changed[v as usize] = true);
+                }
             }
         }
     }
@@ -105,31 +125,70 @@ fn faces_above(
     above.into_iter().map(|(_, f)| f).collect()
 }
 
-/// One edit that makes the face better without adding faces; the vertex in the middle of it.
-fn mend(
-    surface: &mut SurfaceMesh<'_>,
-    gate: &Gate,
-    face: u32,
-    counters: &mut Counters,
-) -> Option<u32> {
-    let edits: [(&str, Edit); 3] =
-        [("edges_flipped", flip), ("vertices_slid", slide), ("vertices_collapsed", collapse)];
-    edits.into_iter().find_map(|(name, edit)| {
-        let center = edit(surface, gate, face)?;
-        counters.repair(name, 1);
-        Some(center)
-    })
+/// An edit that makes a face better without adding faces.
+#[derive(Clone, Copy, Debug)]
+enum Mend {
+    Flip(HalfEdge),
+    Slide(u32, Vertex),
+    Collapse(HalfEdge, Vertex),
 }
 
-/// An edit about a face, if one helps: a vertex whose neighbours include all that it touches.
-type Edit = fn(&mut SurfaceMesh<'_>, &Gate, u32) -> Option<u32>;
+impl Mend {
+    /// Makes it; the vertex in the middle, whose neighbours include all that it touches.
+    fn make(self, surface: &mut SurfaceMesh<'_>, counters: &mut Counters) -> u32 {
+        match self {
+            Self::Flip(h) => {
+                counters.repair("edges_flipped", 1);
+                let turned = surface.flip(h);
+                surface.mesh.origin(turned)
+            }
+            Self::Slide(vertex, moved) => {
+                counters.repair("vertices_slid", 1);
+                surface.place(vertex, moved);
+                vertex
+            }
+            Self::Collapse(h, merged) => {
+                counters.repair("vertices_collapsed", 1);
+                let kept = surface.mesh.origin(h);
+                surface.collapse(h, merged);
+                kept
+            }
+        }
+    }
+}
+
+/// For each face the first edit that helps, as if it were the only one; on the host's threads.
+fn mends(surface: &SurfaceMesh<'_>, gate: &Gate, faces: &[u32]) -> Vec<Option<Mend>> {
+    let tasks: Vec<_> = faces.chunks(MENDS_A_TASK).collect();
+    map(surface.host, tasks.len(), |task| {
+        let mut found: Vec<Option<Mend>> =
+            tasks[task].iter().map(|&face| flip(surface, gate, face)).collect();
+        for edit in [slides, collapses] {
+            let open: Vec<usize> = (0..found.len()).filter(|&i| found[i].is_none()).collect();
+            let faces: Vec<u32> = open.iter().map(|&i| tasks[task][i]).collect();
+            for (i, mend) in open.into_iter().zip(edit(surface, gate, &faces)) {
+                found[i] = mend;
+            }
+        }
+        found
+    })
+    .concat()
+}
+
+/// Whether all that the edit of a face depends on is as it was at a time: the faces about its
+/// corners and about the vertices opposite to its sides.
+fn is_as_at(surface: &SurfaceMesh<'_>, time: u32, face: u32) -> bool {
+    let opposite = |h: HalfEdge| surface.mesh.opposite(h).map(|o| surface.mesh.origin(o.prev()));
+    let beside = halves(face).into_iter().filter_map(opposite);
+    surface.mesh.face(face).into_iter().chain(beside).all(|v| surface.fan_is_as_at(time, v))
+}
 
 fn halves(face: u32) -> [HalfEdge; 3] {
     [0, 1, 2].map(|k| HalfEdge::new(face, k))
 }
 
 /// The flip that leaves the best faces.
-fn flip(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
+fn flip(surface: &SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<Mend> {
     let mut best: Option<(f64, HalfEdge)> = None;
     for h in halves(face) {
         let Some([before, after]) = surface.flip_cost(gate, h) else { continue };
@@ -137,57 +196,65 @@ fn flip(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
             best = Some((after, h));
         }
     }
-    let turned = surface.mesh.flip(best?.1);
-    Some(surface.mesh.origin(turned))
+    best.map(|(_, h)| Mend::Flip(h))
 }
 
-/// Moves a corner towards the middle of its neighbours, along the surface.
-fn slide(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
+/// For each face the move of a corner towards the middle of its neighbours, along the surface.
+fn slides(surface: &SurfaceMesh<'_>, gate: &Gate, faces: &[u32]) -> Vec<Option<Mend>> {
     const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
-    let corners = surface.mesh.face(face);
-    let steps = corners.map(|v| {
+    let step = |v: u32| {
         let (n, sum) = surface
             .mesh
             .neighbours(v)
             .fold((0.0, Vec3::zeros()), |(n, sum), w| (n + 1.0, sum + surface.at(w).position));
         sum / n - surface.at(v).position
-    });
-    let target = |i: usize| surface.at(corners[i / 3]).position + PARTS[i % 3] * steps[i / 3];
-    let reach = |i: usize| steps[i / 3].norm();
-    let before = corners.map(|v| surface.fan_cost(gate, v));
-    let feet: [_; 9] = surface.feet_within(std::array::from_fn(target), std::array::from_fn(reach));
-    for (i, moved) in feet.into_iter().enumerate() {
-        let (v, Some(moved)) = (corners[i / 3], moved) else { continue };
-        if surface.move_is_better(gate, v, &moved, GAIN * before[i / 3]) {
-            surface.place(v, moved);
-            return Some(v);
-        }
-    }
-    None
+    };
+    let tries = |face: &u32| {
+        let corners = surface.mesh.face(*face);
+        let steps = corners.map(step);
+        let target = |i: usize| surface.at(corners[i / 3]).position + PARTS[i % 3] * steps[i / 3];
+        let reach = |i: usize| steps[i / 3].norm();
+        (0..9).map(|i| (target(i), reach(i))).collect::<Vec<_>>()
+    };
+    let feet = surface.feet_within(faces.iter().flat_map(tries));
+    let best = |(&face, feet): (&u32, &[Option<Vertex>; 9])| {
+        let corners = surface.mesh.face(face);
+        let before = corners.map(|v| surface.fan_cost(gate, v));
+        (0..9).find_map(|i| {
+            let (v, moved) = (corners[i / 3], feet[i]?);
+            let is_better = surface.move_is_better(gate, v, &moved, GAIN * before[i / 3]);
+            is_better.then_some(Mend::Slide(v, moved))
+        })
+    };
+    faces.iter().zip(feet.as_chunks::<9>().0).map(best).collect()
 }
 
-/// Merges the ends of an edge, shortest first, if the faces left are fit and better.
-fn collapse(surface: &mut SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<u32> {
-    let mut sides = halves(face).map(|h| {
-        let [p, q] = surface.ends(h);
-        ((q.position - p.position).norm(), h)
-    });
-    sides.sort_by(|x, y| x.0.total_cmp(&y.0));
-    let middles = surface.feet_within(sides.map(|(_, h)| surface.middle(h)), sides.map(|s| s.0));
-    for ((_, h), middle) in sides.into_iter().zip(middles) {
+/// For each face the merging of the ends of a side, shortest first, if the faces left are fit and
+/// better.
+fn collapses(surface: &SurfaceMesh<'_>, gate: &Gate, faces: &[u32]) -> Vec<Option<Mend>> {
+    let sides = |face: &u32| {
+        let mut sides = halves(*face).map(|h| {
+            let [p, q] = surface.ends(h);
+            ((q.position - p.position).norm(), h)
+        });
+        sides.sort_by(|x, y| x.0.total_cmp(&y.0));
+        sides
+    };
+    let sides: Vec<(f64, HalfEdge)> = faces.iter().flat_map(sides).collect();
+    let middles = surface.feet_within(sides.iter().map(|&(length, h)| (surface.middle(h), length)));
+    let merge = |(&(_, h), middle): (&(f64, HalfEdge), &Option<Vertex>)| {
         let ends = surface.ends(h).map(|v| *v);
         let before =
             [surface.mesh.origin(h), surface.mesh.target(h)].map(|v| surface.fan_cost(gate, v));
         let limit = (GAIN * before[0].max(before[1])).min(SOFT);
-        for merged in middle.into_iter().chain(ends) {
-            if surface.collapse_is_better(gate, h, &merged, limit) {
-                let kept = surface.mesh.origin(h);
-                surface.collapse(h, merged);
-                return Some(kept);
-            }
-        }
-    }
-    None
+        let mut choices = middle.iter().copied().chain(ends);
+        let merged = choices.find(|merged| surface.collapse_is_better(gate, h, merged, limit))?;
+        Some(Mend::Collapse(h, merged))
+    };
+    let of_face = |(sides, middles): (&[(f64, HalfEdge)], &[Option<Vertex>])| {
+        sides.iter().zip(middles).find_map(merge)
+    };
+    sides.chunks(3).zip(middles.chunks(3)).map(of_face).collect()
 }
 
 /// Splits the worst edge of the face at its middle, unless a corner has a new edge already.
@@ -211,7 +278,7 @@ fn split(
     if around.iter().any(|&v| split_near.get(v as usize).copied().unwrap_or(true)) {
         return;
     }
-    let [Some(middle)] = surface.feet_within([surface.middle(h)], [length]) else { return };
+    let Some(middle) = surface.foot_within(surface.middle(h), length) else { return };
     // Where the surface folds away below an edge the foot falls to an end: halves no shorter.
     let ends = surface.ends(h).map(|v| (v.position - middle.position).norm());
     if ends.iter().any(|&half| half < SHORTEST_HALF * length) {

@@ -24,7 +24,7 @@ pub(crate) fn split_faces(
         let longest = sides.into_iter().max_by(|&x, &y| length(x).total_cmp(&length(y)));
         let longest = longest.expect("invariant: a face has sides");
         let reach = length(longest);
-        let [foot] = surface.feet_within([surface.middle(longest)], [reach]);
+        let foot = surface.foot_within(surface.middle(longest), reach);
         if foot.is_some_and(|foot| surface.split(longest, foot).is_some()) {
             counters.repair("unfit_faces_split", 1);
         }

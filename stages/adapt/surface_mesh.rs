@@ -9,7 +9,7 @@ use crate::gate::{Gate, quality};
 use crate::vertex::{Vertex, feet, vertices_at};
 use isospline_geometry::{EditMesh, HalfEdge, TriangleMesh, Vec3};
 use isospline_implicit::Field;
-use isospline_stage::{Ctx, Host};
+use isospline_stage::{Ctx, Host, Serial};
 
 /// A mesh on a surface.
 #[derive(Clone)]
@@ -24,6 +24,10 @@ pub(crate) struct SurfaceMesh<'a> {
     pub(crate) vertices: Vec<Vertex>,
     /// How often each vertex has moved.
     pub(crate) moves: Vec<u32>,
+    /// When each face was last edited, or a corner of it moved.
+    edited: Vec<u32>,
+    /// Edits so far, and one.
+    now: u32,
 }
 
 impl<'a> SurfaceMesh<'a> {
@@ -33,7 +37,40 @@ impl<'a> SurfaceMesh<'a> {
         let vertices = vertices_at(field, host, &mesh.positions)?;
         let moves = vec![0; vertices.len()];
         let (measure, mesh) = (Measure::Paper, EditMesh::new(mesh)?);
-        Ok(Self { field, host, measure, diagonal, mesh, vertices, moves })
+        let (edited, now) = (vec![1; mesh.face_rows()], 1);
+        Ok(Self { field, host, measure, diagonal, mesh, vertices, moves, edited, now })
+    }
+
+    /// Keeps what `other` is now: without new memory, whose first touch costs more than the copy.
+    pub(crate) fn keep(&mut self, other: &Self) {
+        self.mesh.clone_from(&other.mesh);
+        self.vertices.clone_from(&other.vertices);
+        self.moves.clone_from(&other.moves);
+        self.edited.clone_from(&other.edited);
+        self.now = other.now;
+    }
+
+    /// Goes back to what was kept; all faces count as edited.
+    pub(crate) fn go_back_to(&mut self, kept: Self) {
+        let now = self.now + 1;
+        *self = kept;
+        self.now = now;
+        self.edited.fill(now);
+    }
+
+    /// The present as a time; later edits come after it.
+    pub(crate) fn now(&self) -> u32 {
+        self.now
+    }
+
+    /// Whether a face and the places of its corners are as they were at a time.
+    pub(crate) fn is_as_at(&self, time: u32, face: u32) -> bool {
+        self.edited[face as usize] <= time
+    }
+
+    /// The same of all faces about a vertex.
+    pub(crate) fn fan_is_as_at(&self, time: u32, vertex: u32) -> bool {
+        self.mesh.spokes(vertex).all(|h| self.is_as_at(time, h.face()))
     }
 
     pub(crate) fn at(&self, vertex: u32) -> &Vertex {
@@ -71,16 +108,22 @@ impl<'a> SurfaceMesh<'a> {
         feet(self.field, self.host, self.diagonal, points)
     }
 
-    /// The same for few points, each unless its foot is farther away than its reach: together
-    /// they cost little more than one.
-    pub(crate) fn feet_within<const N: usize>(
+    /// The same on this thread, each unless its foot is farther away than its reach.
+    pub(crate) fn feet_within(
         &self,
-        points: [Vec3; N],
-        reach: [f64; N],
-    ) -> [Option<Vertex>; N] {
-        let feet = self.feet(&points);
-        let near = |i: usize| feet[i].filter(|f| (f.position - points[i]).norm() <= reach[i]);
-        std::array::from_fn(near)
+        tries: impl IntoIterator<Item = (Vec3, f64)>,
+    ) -> Vec<Option<Vertex>> {
+        let (points, reach): (Vec<Vec3>, Vec<f64>) = tries.into_iter().unzip();
+        let mut feet = feet(self.field, &Serial, self.diagonal, &points);
+        for ((foot, point), reach) in feet.iter_mut().zip(points).zip(reach) {
+            *foot = foot.filter(|f| (f.position - point).norm() <= reach);
+        }
+        feet
+    }
+
+    /// The same for one point.
+    pub(crate) fn foot_within(&self, point: Vec3, reach: f64) -> Option<Vertex> {
+        self.feet_within([(point, reach)]).pop().flatten()
     }
 
     /// Worst of the faces about a vertex.
@@ -104,6 +147,26 @@ impl<'a> SurfaceMesh<'a> {
         self.vertices[vertex as usize] = moved;
         self.moves[vertex as usize] += 1;
         self.mesh.positions[vertex as usize] = moved.position;
+        self.note_fan(vertex);
+    }
+
+    /// The faces about a vertex are edited now.
+    fn note_fan(&mut self, vertex: u32) {
+        self.now += 1;
+        for h in self.mesh.spokes(vertex) {
+            self.edited[h.face() as usize] = self.now;
+        }
+    }
+
+    /// Turns an edge; the caller has asked [`Self::flip_cost`]. The half-edge that it is now.
+    pub(crate) fn flip(&mut self, h: HalfEdge) -> HalfEdge {
+        let turned = self.mesh.flip(h);
+        let other = self.mesh.opposite(turned).expect("invariant: it has two faces");
+        self.now += 1;
+        for face in [turned.face(), other.face()] {
+            self.edited[face as usize] = self.now;
+        }
+        turned
     }
 
     /// Worst of the two faces beside an edge, now and after a flip; `None` if it cannot flip.
@@ -120,7 +183,7 @@ impl<'a> SurfaceMesh<'a> {
     /// Whether the ends of `h` can become `merged` and all faces left about them would be better
     /// than `limit`. They cannot where a vertex would keep fewer than four edges.
     pub(crate) fn collapse_is_better(
-        &mut self,
+        &self,
         gate: &Gate,
         h: HalfEdge,
         merged: &Vertex,
@@ -151,6 +214,8 @@ impl<'a> SurfaceMesh<'a> {
         let vertex = self.mesh.split(h, middle.position)?;
         self.vertices.push(middle);
         self.moves.push(0);
+        self.edited.resize(self.mesh.face_rows(), 0);
+        self.note_fan(vertex);
         Some(vertex)
     }
 
