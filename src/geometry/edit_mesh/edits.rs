@@ -27,8 +27,8 @@ impl EditMesh {
             valence_a += 1;
         }
         let is_about_a = |w: u32| match valence_a {
-            // Without a branch, so that the compiler compares many at once.
-            ..=FEW => ring.iter().fold(false, |found, &x| found | (x == w)),
+            // Without an early end, so that the compiler compares many at once.
+            ..=FEW => ring.iter().filter(|&&x| x == w).count() > 0,
             _ => self.spokes(a).any(|s| self.target(s) == w),
         };
         let mut valence_b = 0;
