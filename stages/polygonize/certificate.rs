@@ -41,16 +41,23 @@ pub(crate) struct Cube {
     pub(crate) tetrahedra: Vec<Tetrahedron>,
 }
 
-/// The tetrahedra, of those given, that fail the test, in their order.
+/// The tetrahedra, of those given, that fail the test, in their order, each with the place of its
+/// cube.
 ///
 /// Every cube is searched depth first, for one failing box settles a tetrahedron; but in all cubes
 /// at the same time, because fields enclose many boxes much faster than one by one.
-pub(crate) fn failing(field: &dyn Field, complex: &Complex, cubes: &[Cube]) -> Vec<Tetrahedron> {
+pub(crate) fn failing(
+    field: &dyn Field,
+    complex: &Complex,
+    cubes: &[Cube],
+) -> Vec<(usize, Tetrahedron)> {
     // One word holds the set of open tetrahedra; a cube has 24 of one kind at most.
-    let shares = cubes.iter().flat_map(|cube| cube.tetrahedra.chunks(64).map(move |t| (cube, t)));
-    let mut tests: Vec<Test<'_>> = shares
-        .map(|(cube, tetrahedra)| Test::new(field, complex, cube.domain, tetrahedra))
-        .collect();
+    let shares = cubes
+        .iter()
+        .enumerate()
+        .flat_map(|(k, cube)| cube.tetrahedra.chunks(64).map(move |t| (k, cube.domain, t)));
+    let (owners, mut tests): (Vec<usize>, Vec<Test<'_>>) =
+        shares.map(|(k, domain, t)| (k, Test::new(field, complex, domain, t))).unzip();
     let mut jets = Jets::default();
     loop {
         let batch = next_batch(&mut tests);
@@ -59,11 +66,11 @@ pub(crate) fn failing(field: &dyn Field, complex: &Complex, cubes: &[Cube]) -> V
         }
         look(field, &mut tests, batch, &mut jets);
     }
-    let failed_of = |test: &Test<'_>| {
+    let failed_of = |(owner, test): (usize, &Test<'_>)| {
         let tetrahedra = test.tetrahedra.to_vec();
-        members(test.failed).map(move |i| tetrahedra[i])
+        members(test.failed).map(move |i| (owner, tetrahedra[i]))
     };
-    tests.iter().flat_map(failed_of).collect()
+    owners.into_iter().zip(&tests).flat_map(failed_of).collect()
 }
 
 /// The test of some tetrahedra of one cube.

@@ -68,23 +68,48 @@ impl Complex {
             grid,
             cells: Vec::with_capacity(cells.len()),
             refined: Vec::new(),
-            cell_at: KeyMap::with_room_for(cells.len()),
+            cell_at: KeyMap::with_room_for(0),
             sites: Vec::new(),
             values: Vec::new(),
-            node_at: KeyMap::with_room_for(2 * cells.len()),
+            node_at: KeyMap::with_room_for(0),
             halved: KeyMap::with_room_for(0),
             queue: Vec::new(),
             queued: vec![false; cells.len()],
             touched: Vec::new(),
         };
-        for (row, &cell) in (0u32..).zip(cells) {
+        let mut nodes = GridNodes::of(&complex.grid, cells.len());
+        for &cell in cells {
             let corner = |i: u32| [cell[0] + (i & 1), cell[1] + (i >> 1 & 1), cell[2] + (i >> 2)];
-            let corners = std::array::from_fn(|i| complex.node(corner(i as u32)));
-            complex.cell_at.get_or_insert(pack(cell), row);
+            let corners = std::array::from_fn(|i| {
+                let at = corner(i as u32);
+                let (node, is_new) = nodes.get_or_insert(at, complex.sites.len() as u32);
+                if is_new {
+                    complex.sites.push(pack(at.map(|c| c << complex.grid.levels)));
+                }
+                node
+            });
             complex.cells.push(Cell { corners, refined: WHOLE });
         }
         complex.evaluate(ctx)?;
         Ok(complex)
+    }
+
+    /// How much the slopes of f along the axes change across a cell, of the slopes; not a number
+    /// where they are not.
+    pub(crate) fn bend(&self, cell: usize) -> f64 {
+        let values = self.cells[cell].corners.map(|n| self.value(n));
+        let (mut bend_sq, mut slope_sq) = (0.0, 0.0);
+        for axis in [1, 2, 4] {
+            let lower = (0..8).filter(|i| i & axis == 0);
+            let slopes = lower.map(|i| values[i | axis] - values[i]);
+            let (least, most, sum) = slopes
+                .fold((f64::INFINITY, f64::NEG_INFINITY, 0.0), |(least, most, sum), slope| {
+                    (slope.min(least), slope.max(most), sum + slope)
+                });
+            bend_sq += (most - least) * (most - least);
+            slope_sq += 0.0625 * sum * sum;
+        }
+        (bend_sq / slope_sq).sqrt()
     }
 
     /// Gives up what only refining needs: a third of the memory.
@@ -172,6 +197,13 @@ impl Complex {
         ctx: &Ctx<'_>,
         tetrahedra: &[Tetrahedron],
     ) -> Result<Vec<Tetrahedron>, PolygonizeError> {
+        if self.cell_at.is_empty() {
+            self.cell_at = KeyMap::with_room_for(self.cells.len());
+            for (row, cell) in (0u32..).zip(&self.cells) {
+                let at = self.site(cell.corners[0]).map(|c| c >> self.grid.levels);
+                self.cell_at.get_or_insert(pack(at), row);
+            }
+        }
         for t in tetrahedra {
             let (i, j) = self.longest_edge(t);
             self.halve(t[i], t[j]);
@@ -271,10 +303,7 @@ impl Complex {
         }
     }
 
-    fn node(&mut self, grid_node: Site) -> u32 {
-        self.lattice_node(grid_node.map(|c| c << self.grid.levels))
-    }
-
+    /// A node between those of the grid.
     fn lattice_node(&mut self, at: Site) -> u32 {
         let key = pack(at);
         let (node, is_new) = self.node_at.get_or_insert(key, self.sites.len() as u32);
@@ -296,6 +325,44 @@ impl Complex {
         }
         self.values.extend(found);
         Ok(())
+    }
+}
+
+/// The nodes of a grid while they are numbered.
+enum GridNodes {
+    /// One row a node of the whole grid, [`WHOLE`] where there is none yet.
+    All { size: [usize; 2], rows: Vec<u32> },
+    /// Where that would be too many.
+    Some(KeyMap),
+}
+
+impl GridNodes {
+    /// Rows of the whole grid for each cell with surface, from which on a map takes less memory.
+    const MOST_A_CELL: usize = 16;
+
+    fn of(grid: &Grid, n_cells: usize) -> Self {
+        let [x, y, z] = grid.cells.map(|n| n as usize + 1);
+        if x.saturating_mul(y).saturating_mul(z) <= Self::MOST_A_CELL * n_cells {
+            Self::All { size: [x, y], rows: vec![WHOLE; x * y * z] }
+        } else {
+            Self::Some(KeyMap::with_room_for(2 * n_cells))
+        }
+    }
+
+    /// The row of a node, and whether it is new: then it is `row`.
+    fn get_or_insert(&mut self, at: Site, row: u32) -> (u32, bool) {
+        match self {
+            Self::All { size: [nx, ny], rows } => {
+                let [x, y, z] = at.map(|c| c as usize);
+                let place = &mut rows[x + *nx * (y + *ny * z)];
+                let is_new = *place == WHOLE;
+                if is_new {
+                    *place = row;
+                }
+                (*place, is_new)
+            }
+            Self::Some(map) => map.get_or_insert(pack(at), row),
+        }
     }
 }
 

@@ -22,6 +22,11 @@ impl KeyMap {
         Self { keys: vec![FREE; slots], rows: vec![0; slots], len: 0 }
     }
 
+    /// Whether there is no key.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
     /// The row of `key`.
     pub(crate) fn get(&self, key: u64) -> Option<u32> {
         let slot = self.slot(key);

@@ -78,10 +78,14 @@ use isospline_artifact::kinds::{Mesh, TopologyProof};
 use isospline_geometry::TriangleMesh;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
 use marching::Pieces;
+use proof::Beside;
 use resolution::Survey;
 
 /// Triangles made at least for each face wanted: decimation only takes away.
 const LEAST_OF_FACES: f64 = 1.05;
+/// Cells up to which the mesh is made beside the proof, on a copy of the complex; the parts of a
+/// larger one keep all threads busy, and it has no memory to spare.
+const SMALL: usize = 100_000;
 /// Grids on which that is tried.
 const MOST_TRIES: u32 = 3;
 
@@ -180,7 +184,17 @@ fn triangulate(
     drop(cells);
     counters.count("cells", complex.n_cells() as u64);
     counters.max("cells_a_side", f64::from(grid.longest()));
-    let failed = proof::prove(ctx, &mut complex, params, counters)?;
+    let failed = if sides_are_clear && complex.n_cells() <= SMALL {
+        match proof::prove_beside(ctx, &complex, params, counters, extract)? {
+            Beside::Proved(mesh) => return Ok((mesh?, TopologyProof::Certified)),
+            Beside::Refine(failed) => {
+                let failed = (failed, usize::MAX);
+                proof::refine_failing(ctx, &mut complex, params, failed, counters)?
+            }
+        }
+    } else {
+        proof::prove(ctx, &mut complex, params, counters)?
+    };
     if sides_are_clear && failed.is_empty() {
         return Ok((extract(ctx, complex)?, TopologyProof::Certified));
     }

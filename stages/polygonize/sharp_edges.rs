@@ -9,7 +9,7 @@
 use crate::{PolygonizeError, bulk};
 use isospline_geometry::{TriangleMesh, Vec3};
 use isospline_implicit::{Field, Jet1};
-use isospline_stage::Ctx;
+use isospline_stage::{Ctx, map};
 
 /// Angle that counts: patches over a smaller one miss the surface by less than they do elsewhere.
 const LEAST_ANGLE_DEG: f64 = 3.0;
@@ -23,6 +23,8 @@ const MOST_HALVINGS: usize = 60;
 const SHORT: f64 = 1e-7;
 /// Newton steps that move a middle onto the surface.
 const STEPS: usize = 3;
+/// Faces whose edges are looked at in a task.
+const FACES_A_TASK: usize = 2048;
 /// Length of the gradient, of the median over the mesh, below which a place is singular, not sharp.
 const LEAST_SLOPE: f64 = 1e-6;
 
@@ -32,22 +34,11 @@ const LEAST_SLOPE: f64 = 1e-6;
 /// [`PolygonizeError::SharpEdge`] with the sharpest that was found.
 pub(crate) fn none_on(ctx: &Ctx<'_>, mesh: &TriangleMesh) -> Result<(), PolygonizeError> {
     let ends = gradients(ctx, &mesh.positions);
-    let mut chords: Vec<Chord> = Vec::new();
-    for face in &mesh.faces {
-        for k in 0..3 {
-            let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
-            // The face on the other side has the edge the other way round.
-            if a < b {
-                let end = |v: usize| End { at: mesh.positions[v], jet: ends[v] };
-                chords.push(Chord::new(end(a), end(b)));
-            }
-        }
-    }
-    chords.retain(Chord::turns);
-    let before: Vec<f64> = chords.iter().map(Chord::angle_deg).collect();
+    let mut chords = turning_edges(ctx, mesh, &ends);
+    let before = chords.clone();
     halve(ctx, &mut chords, 0);
-    let mut before = before.into_iter();
-    chords.retain(|c| before.next().is_some_and(|angle| c.angle_deg() > SUSPECT * angle));
+    let mut before = before.iter();
+    chords.retain(|c| before.next().is_some_and(|whole| c.keeps_angle_of(whole)));
     for _ in 0..MOST_HALVINGS {
         chords.retain(Chord::turns);
         if chords.iter().all(Chord::is_short) {
@@ -59,6 +50,25 @@ pub(crate) fn none_on(ctx: &Ctx<'_>, mesh: &TriangleMesh) -> Result<(), Polygoni
     let is_sharp = |c: &&Chord| c.turns() && c.is_short() && c.is_on_surface(least_slope);
     let sharpest = chords.iter().filter(is_sharp).max_by(|a, b| a.turn().total_cmp(&b.turn()));
     sharpest.map_or(Ok(()), |chord| Err(chord.told(ctx.field)))
+}
+
+/// The edges of a mesh whose ends have other normals, in the order of the faces.
+fn turning_edges(ctx: &Ctx<'_>, mesh: &TriangleMesh, ends: &[Jet1]) -> Vec<Chord> {
+    let normals: Vec<Vec3> = ends.iter().map(|jet| jet.gradient / jet.gradient.norm()).collect();
+    // A little less than the angle that counts: the chord of it on the unit circle, squared.
+    let least = 2.0 - 2.0 * libm::cos((0.99 * LEAST_ANGLE_DEG).to_radians());
+    let shares: Vec<_> = mesh.faces.chunks(FACES_A_TASK).collect();
+    let found = map(ctx.host, shares.len(), |share| {
+        let sides = shares[share].iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        // The face on the other side has the edge the other way round.
+        let turning = sides.filter(|[a, b]| {
+            a < b && (normals[*a as usize] - normals[*b as usize]).norm_squared() >= least
+        });
+        let end = |v: u32| End { at: mesh.positions[v as usize], jet: ends[v as usize] };
+        let chords = turning.map(|[a, b]| Chord::new(end(a), end(b)));
+        chords.filter(Chord::turns).collect::<Vec<_>>()
+    });
+    found.concat()
 }
 
 /// Halves chords, keeping the half that turns more; middles are moved onto the surface by so many
@@ -136,6 +146,14 @@ impl Chord {
         // The chord of the unit circle: exact for small angles too. 2 asin(t / 2) by the tangent.
         let half_sq = 0.25 * self.turn().min(4.0);
         2.0 * libm::atan2(half_sq.sqrt(), (1.0 - half_sq).max(0.0).sqrt()).to_degrees()
+    }
+
+    /// Whether it has so much of the angle of another that it may lie on a sharp edge.
+    fn keeps_angle_of(&self, whole: &Self) -> bool {
+        // Of two angles below 180 degrees the chords on the unit circle have the larger ratio
+        // to 1: most edges are told by them, without arcs.
+        let falls = self.turn() < 0.999 * SUSPECT * SUSPECT * whole.turn();
+        !falls && self.angle_deg() > SUSPECT * whole.angle_deg()
     }
 
     fn turns(&self) -> bool {

@@ -28,8 +28,7 @@ pub(crate) fn merge(ctx: &Ctx<'_>, mesh: TriangleMesh, sides: Vec<f64>) -> Trian
         if mesh.faces.len() > TILE { merge_tiles(ctx, mesh, &sides) } else { (mesh, sides) };
     let normals = normals(ctx, &mesh.positions);
     let mut edit = EditMesh::new(mesh).expect("invariant: marching tetrahedra make a manifold");
-    // A merge may free another that was refused before, say about a vertex with three faces.
-    while merge_once(&mut edit, &normals, &sides, &[]) > 0 {}
+    merge_all(&mut edit, &normals, &sides, &[]);
     edit.compact()
 }
 
@@ -76,33 +75,48 @@ fn merge_tile(
     for v in edit.vertices().filter(|&v| !edit.on_border(v)) {
         kept[v as usize] = edit.neighbours(v).any(|n| edit.on_border(n));
     }
-    while merge_once(&mut edit, &normals, &sides, &kept) > 0 {}
+    merge_all(&mut edit, &normals, &sides, &kept);
     edit.live_faces().map(|f| edit.face(f).map(|v| vertices[v as usize])).collect()
 }
 
-/// Tries all short edges, the shortest first, but those of `kept` vertices; the number merged.
-fn merge_once(edit: &mut EditMesh, normals: &[Vec3], sides: &[f64], kept: &[bool]) -> usize {
+/// Merges short edges, but those of `kept` vertices, until none is left that may go.
+fn merge_all(edit: &mut EditMesh, normals: &[Vec3], sides: &[f64], kept: &[bool]) {
     let is_kept = |v: u32| kept.get(v as usize).copied().unwrap_or(false);
-    let mut merged = 0;
-    for (_, h) in short_edges(edit, sides) {
-        // Earlier merges rename and remove: look again at what is there now.
-        if !edit.is_face(h.face()) {
-            continue;
-        }
-        let (a, b) = (edit.origin(h), edit.target(h));
-        if is_kept(a) || is_kept(b) || !is_short(edit, sides, a, b) || !edit.can_collapse(h) {
-            continue;
-        }
-        let o = edit.opposite(h).expect("invariant: the mesh is closed");
-        if may_move(edit, normals, b, a) {
+    // A merge may free another that was refused before, say about a vertex with three faces: one
+    // of an edge about whose ends the faces have changed.
+    let mut changed = vec![true; edit.vertex_rows()];
+    loop {
+        let before = std::mem::replace(&mut changed, vec![false; edit.vertex_rows()]);
+        let mut merged = false;
+        for (_, h) in short_edges(edit, sides) {
+            // Earlier merges rename and remove: look again at what is there now.
+            if !edit.is_face(h.face()) {
+                continue;
+            }
+            let (a, b) = (edit.origin(h), edit.target(h));
+            if ![a, b].iter().any(|&v| before[v as usize] || changed[v as usize]) {
+                continue;
+            }
+            if is_kept(a) || is_kept(b) || !is_short(edit, sides, a, b) || !edit.can_collapse(h) {
+                continue;
+            }
+            let o = edit.opposite(h).expect("invariant: the mesh is closed");
+            let (h, left) = if may_move(edit, normals, b, a) {
+                (h, a)
+            } else if may_move(edit, normals, a, b) {
+                (o, b)
+            } else {
+                continue;
+            };
             edit.collapse(h);
-            merged += 1;
-        } else if may_move(edit, normals, a, b) {
-            edit.collapse(o);
-            merged += 1;
+            merged = true;
+            changed[left as usize] = true;
+            edit.neighbours(left).for_each(|v| changed[v as usize] = true);
+        }
+        if !merged {
+            return;
         }
     }
-    merged
 }
 
 fn normals(ctx: &Ctx<'_>, points: &[Vec3]) -> Vec<Vec3> {
