@@ -191,7 +191,8 @@ impl ModelFolder {
             repairs: self.repairs()?,
         };
         let threads = Threads::new(threads);
-        Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
+        let check = || isospline_check::check(&job, &|n, body| threads.for_each(n, body));
+        Ok(threads.within(check))
     }
 
     /// Counters of every fallback that a stage took, as `stage.name`.

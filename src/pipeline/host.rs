@@ -23,10 +23,22 @@ impl Threads {
         Self { threads, pool: OnceLock::new() }
     }
 
+    /// Runs `work` on one of the threads. What it shares out then begins at once on that thread;
+    /// from outside, each share would wait for a thread to wake, and its end for the caller to.
+    pub fn within<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match self.get() {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+
     /// Runs `body(0) .. body(n - 1)`, in any order and on any of the threads.
     pub fn for_each(&self, n: usize, body: &(dyn Fn(usize) + Sync)) {
         match self.get() {
-            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().for_each(body)),
+            // One by one: a long part holds up no others.
+            Some(pool) if n > 1 => {
+                pool.install(|| (0..n).into_par_iter().with_max_len(1).for_each(body));
+            }
             _ => (0..n).for_each(body),
         }
     }

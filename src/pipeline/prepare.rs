@@ -140,7 +140,7 @@ fn whole<'f>(
     let host = StageHost { keeper: keeper.as_ref(), ..host(frame, idx) };
     let ctx = Ctx { field: frame.scene.field, domain: frame.scene.domain, host: &host };
     let process = || prepared.process(&ctx, inputs, &Task::default());
-    let piece = caught(process).map_err(|f| frame.failed(idx, 0, f))?;
+    let piece = frame.pool.within(|| caught(process)).map_err(|f| frame.failed(idx, 0, f))?;
     let time = start.elapsed();
     let sections = piece.rows.all();
     let lengths: Vec<usize> = sections.iter().map(|s| s.bytes.len() / s.stride).collect();
