@@ -9,7 +9,7 @@
 use crate::{PolygonizeError, bulk};
 use isospline_geometry::{TriangleMesh, Vec3};
 use isospline_implicit::{Field, Jet1};
-use isospline_stage::{Ctx, map};
+use isospline_stage::{Ctx, Serial, map};
 
 /// Angle that counts: patches over a smaller one miss the surface by less than they do elsewhere.
 const LEAST_ANGLE_DEG: f64 = 3.0;
@@ -24,7 +24,7 @@ const SHORT: f64 = 1e-7;
 /// Newton steps that move a middle onto the surface.
 const STEPS: usize = 3;
 /// Faces whose edges are looked at in a task.
-const FACES_A_TASK: usize = 2048;
+const FACES_A_TASK: usize = 512;
 /// Length of the gradient, of the median over the mesh, below which a place is singular, not sharp.
 const LEAST_SLOPE: f64 = 1e-6;
 
@@ -34,11 +34,7 @@ const LEAST_SLOPE: f64 = 1e-6;
 /// [`PolygonizeError::SharpEdge`] with the sharpest that was found.
 pub(crate) fn none_on(ctx: &Ctx<'_>, mesh: &TriangleMesh) -> Result<(), PolygonizeError> {
     let ends = gradients(ctx, &mesh.positions);
-    let mut chords = turning_edges(ctx, mesh, &ends);
-    let before = chords.clone();
-    halve(ctx, &mut chords, 0);
-    let mut before = before.iter();
-    chords.retain(|c| before.next().is_some_and(|whole| c.keeps_angle_of(whole)));
+    let mut chords = suspects(ctx, mesh, &ends);
     for _ in 0..MOST_HALVINGS {
         chords.retain(Chord::turns);
         if chords.iter().all(Chord::is_short) {
@@ -52,21 +48,26 @@ pub(crate) fn none_on(ctx: &Ctx<'_>, mesh: &TriangleMesh) -> Result<(), Polygoni
     sharpest.map_or(Ok(()), |chord| Err(chord.told(ctx.field)))
 }
 
-/// The edges of a mesh whose ends have other normals, in the order of the faces.
-fn turning_edges(ctx: &Ctx<'_>, mesh: &TriangleMesh, ends: &[Jet1]) -> Vec<Chord> {
+/// Halves of the edges of a mesh whose ends have other normals, where they keep most of the angle;
+/// in the order of the faces.
+fn suspects(ctx: &Ctx<'_>, mesh: &TriangleMesh, ends: &[Jet1]) -> Vec<Chord> {
     let normals: Vec<Vec3> = ends.iter().map(|jet| jet.gradient / jet.gradient.norm()).collect();
     // A little less than the angle that counts: the chord of it on the unit circle, squared.
     let least = 2.0 - 2.0 * libm::cos((0.99 * LEAST_ANGLE_DEG).to_radians());
     let shares: Vec<_> = mesh.faces.chunks(FACES_A_TASK).collect();
-    let found = map(ctx.host, shares.len(), |share| {
+    let found: Vec<Vec<Chord>> = map(ctx.host, shares.len(), |share| {
         let sides = shares[share].iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         // The face on the other side has the edge the other way round.
         let turning = sides.filter(|[a, b]| {
             a < b && (normals[*a as usize] - normals[*b as usize]).norm_squared() >= least
         });
         let end = |v: u32| End { at: mesh.positions[v as usize], jet: ends[v as usize] };
-        let chords = turning.map(|[a, b]| Chord::new(end(a), end(b)));
-        chords.filter(Chord::turns).collect::<Vec<_>>()
+        let edges = turning.map(|[a, b]| Chord::new(end(a), end(b))).filter(Chord::turns);
+        let edges: Vec<Chord> = edges.collect();
+        let mut halves = edges.clone();
+        halve(&Ctx { host: &Serial, ..*ctx }, &mut halves, 0);
+        let pairs = halves.into_iter().zip(&edges);
+        pairs.filter(|(half, edge)| half.keeps_angle_of(edge)).map(|(half, _)| half).collect()
     });
     found.concat()
 }
