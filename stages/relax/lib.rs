@@ -15,6 +15,7 @@ mod numbering;
 mod params;
 mod progress;
 mod restore;
+mod rim;
 mod roughness;
 mod samples;
 mod sextic;
@@ -35,6 +36,7 @@ use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task, map};
 use moves::Moves;
 use progress::{Progress, Start, TileState};
 use restore::Conditions;
+use rim::Rim;
 use samples::{Interior, Samples};
 use tile_solve::Problem;
 use tiling::{Tile, Tiling};
@@ -56,7 +58,7 @@ pub struct Relax {
 
 impl Stage for Relax {
     const NAME: &'static str = "relax";
-    const VERSION: u32 = 4;
+    const VERSION: u32 = 5;
     type Params = RelaxParams;
     type Whole<'a> = (
         BaseMeshView<'a>,
@@ -99,8 +101,9 @@ impl Stage for Relax {
             },
         };
         let mut at = Progress::new(start, tiling.tiles.len());
-        let field = ctx.field;
-        let problem = Problem { mesh, network, moves: &moves, samples: &samples, field, degree };
+        let (rim, field) = (Rim::new(degree), ctx.field);
+        let (moves, samples, rim) = (&moves, &samples, &rim);
+        let problem = Problem { mesh, network, moves, samples, rim, field, degree };
         self.sweep(ctx, &problem, &tiling, &mut at)?;
         let mut counters = Counters::default();
         counters.count("tiles", tiling.tiles.len() as u64);

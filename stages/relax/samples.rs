@@ -31,11 +31,11 @@ pub(crate) struct Samples {
     /// Differences between samples.
     pub(crate) roughness: Roughness,
     /// The points at the samples, then two tangents, counter-clockwise, at every
-    /// [`FOLD_STRIDE`]th of them and at the places on the boundary.
+    /// [`FOLD_STRIDE`]th of them.
     functionals: Functionals,
-    /// Values of all points at the grid's places on the boundary but the corners: beside the long
-    /// side of a sliver, folds do not reach the samples.
-    rim: Vec<[f64; N_CONTROL]>,
+    /// Values of all points at the grid's places on the boundary but the corners; none without
+    /// roughness.
+    border: Vec<[f64; N_CONTROL]>,
     /// Row of each interior point: its weights of all points in [`Samples::even`].
     even: [[f64; N_CONTROL]; N_INTERIOR],
 }
@@ -46,20 +46,20 @@ impl Samples {
     pub(crate) fn new(steps: u32, smoothness: f64, degree: Degree) -> Self {
         let places: Vec<[f64; 3]> = grid(steps as usize).collect();
         let is_inner = |p: &&[f64; 3]| p.iter().all(|&x| x > 0.0);
-        let is_rim = |p: &&[f64; 3]| p.contains(&0.0) && p.iter().all(|&x| x < 1.0);
+        let is_border = |p: &&[f64; 3]| p.contains(&0.0) && p.iter().all(|&x| x < 1.0);
         let values = |&p: &[f64; 3]| degree.bernstein(p);
         let full: Vec<[f64; N_CONTROL]> = places.iter().filter(is_inner).map(values).collect();
         let interior = interior_indices();
         let inner: Vec<_> = full.iter().map(|row| interior.map(|i| row[i])).collect();
         let tested = places.iter().filter(is_inner).step_by(FOLD_STRIDE);
-        let tested = tested.chain(places.iter().filter(is_rim));
         let tangents = tested.flat_map(|at| tangent_weights(degree, at));
         let functionals = full.iter().copied().chain(tangents).collect::<Vec<_>>();
-        let rim = places.iter().filter(is_rim).map(values).collect();
         let roughness = Roughness::new(steps, smoothness);
+        let n_border = if roughness.weight() > 0.0 { usize::MAX } else { 0 };
+        let border = places.iter().filter(is_border).take(n_border).map(values).collect();
         let (pairs, functionals) = (pairs(degree), Functionals::new(&functionals));
         let products = products(&inner, &pairs);
-        Self { inner, pairs, products, roughness, functionals, rim, even: even(degree) }
+        Self { inner, pairs, products, roughness, functionals, border, even: even(degree) }
     }
 
     /// Samples of a patch.
@@ -82,9 +82,9 @@ impl Samples {
         (0..self.len()).map(|i| values.get(i))
     }
 
-    /// Places on the boundary of a patch where [`Samples::folded`] looks; they do not move.
-    pub(crate) fn rim(&self, net: &[Vec3; N_CONTROL]) -> impl Iterator<Item = Vec3> {
-        self.rim.iter().map(|weights| combine(weights, net))
+    /// Places on the boundary of a patch that differences between samples reach; they do not move.
+    pub(crate) fn border(&self, net: &[Vec3; N_CONTROL]) -> impl Iterator<Item = Vec3> {
+        self.border.iter().map(|weights| combine(weights, net))
     }
 
     /// Interior points of which each is the mean of its six neighbours in the net: a patch without
@@ -94,16 +94,10 @@ impl Samples {
     }
 
     /// Samples whose patch normal points against `normal`, and those where it stands off from it by
-    /// more than [`TILT`]; with the places on the boundary and `rim_normal`.
-    pub(crate) fn folded(
-        &self,
-        values: &Values,
-        normal: &[Vec3],
-        rim_normal: &[Vec3],
-    ) -> [usize; 2] {
+    /// more than [`TILT`].
+    pub(crate) fn folded(&self, values: &Values, normal: &[Vec3]) -> [usize; 2] {
         let mut counts = [0, 0];
-        let normals = normal.iter().step_by(FOLD_STRIDE).chain(rim_normal);
-        for (k, outward) in normals.enumerate() {
+        for (k, outward) in normal.iter().step_by(FOLD_STRIDE).enumerate() {
             let at = self.len() + 2 * k;
             let own = values.get(at).cross(&values.get(at + 1));
             let along = own.dot(outward);
@@ -212,8 +206,8 @@ mod tests {
                 assert!((p - Vec3::new(v, w, 0.0)).norm() < 1e-15);
             }
             let up = |n: usize, side: f64| vec![side * Vec3::z(); n];
-            let folded = |side| samples.folded(&values, &up(55, side), &up(33, side));
-            assert_eq!([folded(1.0), folded(-1.0)], [[0; 2], [19 + 33; 2]], "{degree:?}");
+            let folded = |side| samples.folded(&values, &up(55, side));
+            assert_eq!([folded(1.0), folded(-1.0)], [[0; 2], [19; 2]], "{degree:?}");
         }
     }
 

@@ -8,6 +8,7 @@ use crate::functionals::Values;
 use crate::moves::Moves;
 use crate::numbering::Numbering;
 use crate::progress::Progress;
+use crate::rim::{Rim, RimFace};
 use crate::samples::{Interior, Samples};
 use crate::ties::TileTie;
 use crate::tiling::Tile;
@@ -42,6 +43,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) network: NetworkView<'a>,
     pub(crate) moves: &'a Moves,
     pub(crate) samples: &'a Samples,
+    pub(crate) rim: &'a Rim,
     pub(crate) field: &'a dyn Field,
     pub(crate) degree: Degree,
 }
@@ -138,17 +140,21 @@ impl Problem<'_> {
     }
 
     fn faces(&self, tile: &Tile) -> Vec<Face> {
-        let mut faces: Vec<Face> =
-            tile.faces.iter().map(|&f| Face::new(self, f as usize)).collect();
-        let places: Vec<Vec3> = faces.iter().flat_map(|f| self.samples.rim(&f.net)).collect();
-        // Where the field has no normal nothing is folded.
-        let rim = Measured::of(&self.jets(&places));
-        let n = places.len() / faces.len().max(1);
-        for (i, face) in faces.iter_mut().enumerate() {
-            face.rim_normal = rim.normal[i * n..(i + 1) * n].to_vec();
-            face.rim_distance = rim.distance[i * n..(i + 1) * n].to_vec();
-        }
-        faces
+        let net = |&f: &u32| self.degree.boundary_net(&self.mesh, &self.network, f as usize);
+        let nets: Vec<_> = tile.faces.iter().map(net).collect();
+        let places: Vec<Vec3> = nets.iter().flat_map(|net| self.rim.places(net)).collect();
+        let rim = Measured::of(&self.jets(&places)).normal;
+        let places: Vec<Vec3> = nets.iter().flat_map(|net| self.samples.border(net)).collect();
+        let border = Measured::of(&self.jets(&places)).distance;
+        let part = |i: usize, n: usize| i * n / nets.len()..(i + 1) * n / nets.len();
+        let face = |(i, net): (usize, &[Vec3; N_CONTROL])| Face {
+            boundary: self.samples.of_boundary(net),
+            rim: self.rim.of_boundary(net, &rim[part(i, rim.len())]),
+            moves: FaceMoves::new(&self.mesh, self.moves, tile.faces[i] as usize),
+            border: border[part(i, border.len())].to_vec(),
+            net: *net,
+        };
+        nets.iter().enumerate().map(face).collect()
     }
 
     fn jets(&self, points: &[Vec3]) -> Vec<Jet1> {
@@ -167,12 +173,11 @@ impl Problem<'_> {
         let mut out = Measured::of(&self.jets(&points));
         for (i, (face, values)) in faces.iter().zip(&values).enumerate() {
             let rows = i * self.samples.len()..(i + 1) * self.samples.len();
-            let rough = self.samples.roughness.of(&out.distance[rows.clone()], &face.rim_distance);
+            let rough = self.samples.roughness.of(&out.distance[rows.clone()], &face.border);
             out.force.extend(rough.force);
             out.cost += rough.sum_sq;
-            let normals = &out.normal[rows];
-            let [folds, tilted] = self.samples.folded(values, normals, &face.rim_normal);
-            out.folds.push(folds);
+            let [folds, tilted] = self.samples.folded(values, &out.normal[rows]);
+            out.folds.push(folds + self.rim.folds(&face.rim, &interior[i]));
             out.tilted += tilted;
         }
         out.unsound += out.folds.iter().sum::<usize>();
@@ -232,35 +237,23 @@ struct Face {
     /// What the boundary adds to all that is sampled.
     boundary: Values,
     moves: FaceMoves,
-    /// Mean side.
-    size: f64,
-    /// Unit normals of the field at the places on the boundary that are tested for folds.
-    rim_normal: Vec<Vec3>,
-    /// Distances there.
-    rim_distance: Vec<f64>,
+    rim: RimFace,
+    /// Distances at the places on the boundary that differences between samples reach.
+    border: Vec<f64>,
 }
 
 impl Face {
-    fn new(problem: &Problem<'_>, face: usize) -> Self {
-        let net = problem.degree.boundary_net(&problem.mesh, &problem.network, face);
-        let corners = [0, 1, 2].map(|corner| net[boundary_index(DEGREE, corner, 0)]);
-        let side = |k: usize| (corners[k] - corners[(k + 1) % 3]).norm();
-        let size = (side(0) + side(1) + side(2)) / 3.0;
-        Self {
-            net,
-            boundary: problem.samples.of_boundary(&net),
-            moves: FaceMoves::new(&problem.mesh, problem.moves, face),
-            size,
-            rim_normal: Vec::new(),
-            rim_distance: Vec::new(),
-        }
-    }
-
     /// The part of these shifts that keeps within the cap.
     fn cap(&self, shifts: &Interior) -> f64 {
         let longest = shifts.iter().fold(0.0, |acc: f64, s| acc.max(s.norm()));
-        let limit = SHIFT_CAP * self.size;
+        let limit = SHIFT_CAP * self.size();
         if longest > limit { limit / longest } else { 1.0 }
+    }
+
+    /// Mean side.
+    fn size(&self) -> f64 {
+        let [a, b, c] = [0, 1, 2].map(|corner| self.net[boundary_index(DEGREE, corner, 0)]);
+        ((a - b).norm() + (b - c).norm() + (c - a).norm()) / 3.0
     }
 }
 
