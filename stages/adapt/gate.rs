@@ -120,9 +120,13 @@ mod tests {
         Vertex { position: normal, normal, shape: [0.0; 6] }
     }
 
+    fn narrow() -> AdaptParams {
+        AdaptParams { max_turning_deg: 60.0, max_slope: 0.5, ..AdaptParams::default() }
+    }
+
     #[test]
     fn an_edge_of_the_unit_sphere_turns_by_its_angle_and_slopes_by_half_its_sine() {
-        let gate = Gate::new(&AdaptParams::default());
+        let gate = Gate::new(&narrow());
         for (degrees, fit) in [(20.0f64, true), (59.0, true), (61.0, false)] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             let (p, q) = (on_sphere(1.0, 0.0, 0.0), on_sphere(cos, sin, 0.0));
@@ -134,7 +138,7 @@ mod tests {
 
     #[test]
     fn a_face_that_looks_inward_is_unfit_and_a_sliver_is_not() {
-        let gate = Gate::new(&AdaptParams::default());
+        let gate = Gate::new(&narrow());
         let (a, b) = (on_sphere(1.0, 0.0, 0.0), on_sphere(1.0, 0.3, 0.0));
         let (c, thin) = (on_sphere(1.0, 0.1, 0.3), on_sphere(1.0, 0.1, 0.002));
         assert!(gate.face(&[&a, &b, &c]) < 1.0);

@@ -1,8 +1,8 @@
 //! A projected mesh becomes a base mesh that is fit to carry patches.
 //!
-//! The gate: normals along an edge turn at most 60 degrees, the chord rises at most half its
-//! length along a normal, and no face is folded against the normals of its corners. Unfit places
-//! are repaired by flipping, sliding, collapsing and, where nothing else helps, splitting; every
+//! The gate: normals along an edge turn by no more than a limit, the chord rises no more than a
+//! part of its length along a normal, and no face is folded against the normals of its corners.
+//! Unfit places are repaired by flipping, sliding, collapsing and, where nothing else helps, splitting; every
 //! repair is counted. A fit imported mesh passes in all bits of its positions.
 
 mod curve_error;

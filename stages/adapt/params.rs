@@ -39,7 +39,10 @@ pub enum Vertices {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AdaptParams {
-    /// Largest angle between the normals at the ends of an edge, 5 to 120 degrees.
+    /// Largest angle between the normals at the ends of an edge, 5 to 120 degrees. Patches that are
+    /// relaxed bear 100, those of the paper's method 60. With 60 coarse meshes keep flat faces that
+    /// would have been flipped away: of 31 coarse surfaces of nine models two of three fold, with
+    /// 100 one of three, with 110 more again.
     pub max_turning_deg: f64,
     /// Largest part of an edge's chord along the normal at an end, 0.05 to 1.
     pub max_slope: f64,
@@ -66,8 +69,8 @@ pub struct AdaptParams {
 impl Default for AdaptParams {
     fn default() -> Self {
         Self {
-            max_turning_deg: 60.0,
-            max_slope: 0.5,
+            max_turning_deg: 100.0,
+            max_slope: 0.8,
             min_quality: 0.1,
             max_rounds: 40,
             improve: Improve::Auto,

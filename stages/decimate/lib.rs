@@ -2,8 +2,8 @@
 //!
 //! Edges are collapsed in order of their quadric error [GH97, Sec. 4] until the wanted number of faces
 //! is left. The quadrics are weighted by the curvature of the field, and a collapse is refused
-//! that would leave edges or faces which the later stages cannot fit (MATH: base edges turn at
-//! most 60 degrees). Vertices of the result are near the surface, not on it.
+//! that would leave edges or faces which the later stages cannot fit (MATH: base edges turn
+//! too far). Vertices of the result are near the surface, not on it.
 
 mod error;
 mod guards;

@@ -15,7 +15,8 @@ pub struct DecimateParams {
     pub spread: f64,
     /// Least quality of a new face, 0 to 1 (equilateral); slivers below it are refused.
     pub min_quality: f64,
-    /// Largest angle between the normals at the ends of a new edge, 5 to 180 degrees.
+    /// Largest angle between the normals at the ends of a new edge, 5 to 180 degrees; short of the
+    /// limit of adapt, as vertices move afterwards.
     pub max_turning_deg: f64,
     /// Largest part of a new edge's chord along the normal at an end, 0.05 to 1.
     pub max_slope: f64,
@@ -30,8 +31,8 @@ impl Default for DecimateParams {
             curvature_power: 1.0,
             spread: 1e-3,
             min_quality: 0.2,
-            max_turning_deg: 50.0,
-            max_slope: 0.42,
+            max_turning_deg: 85.0,
+            max_slope: 0.7,
             max_valence: 9,
         }
     }

@@ -33,10 +33,9 @@ const TOO_FEW: [&str; 6] = [
 ];
 
 /// The distance from which patches are not brought nearer: part of the tolerance, since the worst
-/// patch decides, and no more than what unfolds coarse patches (deccube of 2661 faces at 1e-5 keeps
-/// two folds with 3e-6).
+/// patch decides.
 pub(crate) fn relax_goal(tolerance: f64) -> f64 {
-    (0.1 * tolerance).min(1e-7)
+    0.1 * tolerance
 }
 
 /// The last stage of a round of curves, and the largest error that it counts.

@@ -74,7 +74,12 @@ fn soup(mesh: &TriangleMesh) -> Vec<[[u64; 3]; 3]> {
     faces
 }
 
-/// Asserts the gate with code of its own, and that all vertices lie on the surface.
+/// Edges turn at most 60 degrees and rise at most half their chord.
+fn narrow() -> AdaptParams {
+    AdaptParams { max_turning_deg: 60.0, max_slope: 0.5, ..AdaptParams::default() }
+}
+
+/// Asserts the [`narrow`] gate with code of its own, and that all vertices lie on the surface.
 fn assert_fit(field: &dyn Field, mesh: &TriangleMesh, name: &str) {
     let diagonal = mesh.bounds().diagonal();
     let jets: Vec<_> = mesh.positions.iter().map(|&p| field.gradient(p)).collect();
@@ -109,7 +114,7 @@ fn fit_imported_meshes_pass_in_all_bits() {
         ("double_torus_1800", DOUBLE_TORUS),
     ] {
         let (field, mesh) = (formula(text), fixture(name));
-        let piece = adapt(&field, &mesh, TopologyProof::Imported, &AdaptParams::default()).unwrap();
+        let piece = adapt(&field, &mesh, TopologyProof::Imported, &narrow()).unwrap();
         assert_eq!(soup(&triangles(&piece.rows)), soup(&mesh), "{name}");
         assert_eq!(piece.counters.repairs, BTreeMap::new(), "{name}");
     }
@@ -120,7 +125,7 @@ fn fit_imported_meshes_pass_in_all_bits() {
 fn unfit_imported_meshes_are_repaired_within_their_face_count() {
     for (name, text, genus) in [("chair_4000", CHAIR, 3), ("deccube_5000", DECCUBE, 13)] {
         let (field, mesh) = (formula(text), fixture(name));
-        let piece = adapt(&field, &mesh, TopologyProof::Imported, &AdaptParams::default()).unwrap();
+        let piece = adapt(&field, &mesh, TopologyProof::Imported, &narrow()).unwrap();
         let fit = triangles(&piece.rows);
         assert_fit(&field, &fit, name);
         assert_eq!(characteristic(&fit), 2 - 2 * genus, "{name}");
@@ -136,7 +141,7 @@ fn unfit_imported_meshes_are_repaired_within_their_face_count() {
 fn a_mesh_of_our_own_is_improved_at_the_same_number_of_faces() {
     for (name, text, chi) in [("torus_600", TORUS, 0), ("dodecahedron_1200", DODECAHEDRON, 2)] {
         let (field, mesh) = (formula(text), fixture(name));
-        let piece = adapt(&field, &mesh, TopologyProof::Observed, &AdaptParams::default()).unwrap();
+        let piece = adapt(&field, &mesh, TopologyProof::Observed, &narrow()).unwrap();
         let better = triangles(&piece.rows);
         assert_fit(&field, &better, name);
         assert_eq!(characteristic(&better), chi, "{name}");
@@ -152,7 +157,7 @@ fn a_mesh_of_our_own_is_improved_at_the_same_number_of_faces() {
 fn a_mesh_is_left_alone_or_improved_as_the_user_says() {
     let (field, mesh) = (formula(TORUS), fixture("torus_600"));
     let with = |improve, proof| {
-        let params = AdaptParams { improve, ..AdaptParams::default() };
+        let params = AdaptParams { improve, ..narrow() };
         triangles(&adapt(&field, &mesh, proof, &params).unwrap().rows)
     };
     assert_ne!(soup(&with(Improve::Always, TopologyProof::Imported)), soup(&mesh));
@@ -174,7 +179,7 @@ fn tetrahedron() -> TriangleMesh {
 #[test]
 fn faces_that_the_gate_needs_are_added_and_counted() {
     let field = formula(SPHERE);
-    let params = AdaptParams::default();
+    let params = narrow();
     let piece = adapt(&field, &tetrahedron(), TopologyProof::Imported, &params).unwrap();
     let fit = triangles(&piece.rows);
     assert_fit(&field, &fit, "tetrahedron");
@@ -187,7 +192,7 @@ fn faces_that_the_gate_needs_are_added_and_counted() {
 #[test]
 fn a_mesh_that_rounds_do_not_make_fit_is_refused_with_its_worst_edge() {
     let field = formula(SPHERE);
-    let params = AdaptParams { max_rounds: 1, ..AdaptParams::default() };
+    let params = AdaptParams { max_rounds: 1, ..narrow() };
     let error = adapt(&field, &tetrahedron(), TopologyProof::Imported, &params).unwrap_err();
     assert_eq!(error.code(), "base-mesh-unfit");
     assert!(error.help().unwrap().contains("target.faces"));
@@ -205,7 +210,7 @@ fn a_vertex_without_a_normal_is_named_with_its_place() {
     let mut mesh = tetrahedron();
     let apex = mesh.positions[2];
     mesh.positions.iter_mut().for_each(|p| *p -= apex);
-    let error = adapt(&field, &mesh, TopologyProof::Imported, &AdaptParams::default()).unwrap_err();
+    let error = adapt(&field, &mesh, TopologyProof::Imported, &narrow()).unwrap_err();
     assert_eq!(error, AdaptError::SingularPoint { place: Vec3::zeros() });
     assert_eq!(error.code(), "singular-point");
 }

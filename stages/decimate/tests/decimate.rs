@@ -59,12 +59,17 @@ fn decimate_with(
     stage.process(&ctx, whole, (), &Task::default())
 }
 
+/// Edges that turn and rise as little as the paper's patches need.
+fn narrow(faces: u32) -> DecimateParams {
+    DecimateParams { faces, max_turning_deg: 50.0, max_slope: 0.42, ..DecimateParams::default() }
+}
+
 fn decimate(
     field: &dyn Field,
     mesh: &TriangleMesh,
     faces: u32,
 ) -> Result<Piece<Mesh>, DecimateError> {
-    decimate_with(&Serial, field, mesh, &DecimateParams { faces, ..DecimateParams::default() })
+    decimate_with(&Serial, field, mesh, &narrow(faces))
 }
 
 /// Largest angle between normals along an edge [deg], least quality, largest `|f| / |grad f|` at
@@ -185,7 +190,7 @@ impl Host for Impatient {
 #[test]
 fn a_stop_signal_ends_the_work() {
     let (field, fine) = (torus_field(), torus_mesh(24, 12, Vec3::zeros()));
-    let params = DecimateParams { faces: 100, ..DecimateParams::default() };
+    let params = narrow(100);
     let error = decimate_with(&Impatient, &field, &fine, &params).unwrap_err();
     assert_eq!(error, DecimateError::Stopped(Stopped));
 }
@@ -193,7 +198,7 @@ fn a_stop_signal_ends_the_work() {
 fn contract_fixture() -> contract::Fixture<Decimate> {
     let mesh = torus_mesh(40, 20, Vec3::zeros());
     let input = Mesh::from_triangles(&mesh, TopologyProof::Observed).unwrap();
-    let params = DecimateParams { faces: 300, ..DecimateParams::default() };
+    let params = narrow(300);
     contract::Fixture::new(torus_field(), mesh.bounds()).with_params(params).with_input(input)
 }
 
