@@ -40,9 +40,9 @@ pub enum Vertices {
 #[serde(deny_unknown_fields, default)]
 pub struct AdaptParams {
     /// Largest angle between the normals at the ends of an edge, 5 to 120 degrees. Patches that are
-    /// relaxed bear 100, those of the paper's method 60. With 60 coarse meshes keep flat faces that
-    /// would have been flipped away: of 31 coarse surfaces of nine models two of three fold, with
-    /// 100 one of three, with 110 more again.
+    /// relaxed bear 100, those of the paper's method 60, which leaves coarse meshes no choice: of 31
+    /// coarse surfaces of nine models 2 have no fold and no more faces than asked for with 60, 13
+    /// with 90, 19 with 100, 18 with 110.
     pub max_turning_deg: f64,
     /// Largest part of an edge's chord along the normal at an end, 0.05 to 1.
     pub max_slope: f64,
