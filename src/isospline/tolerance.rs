@@ -96,8 +96,10 @@ const FIRST_RATIO: f64 = 0.5;
 /// The error falls by this power of the faces where two rounds do not tell; 3.5 to 4 in the long
 /// run, less or more where meshes are of chance quality.
 const ORDER: f64 = 3.0;
-/// Factor on the faces of an unsound surface.
-const SOUND_STEP: f64 = 1.6;
+/// Factors on the faces of an unsound surface, the first, the second and later ones: few more are
+/// enough as a rule (deccube is unsound with 1000 faces at 1e-4, sound with 1100), but what a
+/// formula needs may be ten times as much.
+const SOUND_STEPS: [f64; 3] = [1.3, 1.6, 2.0];
 /// Unsound surfaces after which more faces are not thought to help.
 const MOST_UNSOUND: usize = 6;
 /// Rounds of surfaces, and of curves.
@@ -107,8 +109,8 @@ const MOST_CURVES: usize = 9;
 pub(crate) const MOST_REFUSALS: usize = 4;
 /// Numbers of faces within this factor are the same: meshes of one count vary as much.
 const NEAR: f64 = 1.12;
-/// The same where fewer made no sound surface: each trial is a whole surface.
-const SOUND_NEAR: f64 = 1.35;
+/// The same where fewer made no sound surface: each trial is a whole surface, or several.
+const SOUND_NEAR: f64 = 1.2;
 
 /// What to do after these rounds.
 pub fn next(rounds: &[Round]) -> Step {
@@ -222,15 +224,18 @@ impl<'a> Search<'a> {
             }
             return if n_surfaces >= MOST_SURFACES { end(best, Verdict::Settled) } else { None };
         }
-        let n_unsound = self.rounds.iter().filter(|r| r.is_of_surface() && r.sound().is_none());
         let is_over = n_surfaces >= MOST_SURFACES
-            || n_unsound.count() >= MOST_UNSOUND
+            || self.n_unsound() >= MOST_UNSOUND
             || (n_surfaces > 0 && self.is_stuck());
         // Without a sound one the last: it has the most faces as a rule.
         let order = |r: &&Round| r.sound().unwrap_or(f64::INFINITY);
         let surfaces = self.rounds.iter().rev().filter(|r| r.is_of_surface());
         let least = surfaces.min_by(|x, y| order(x).total_cmp(&order(y)));
         least.filter(|_| is_over).and_then(|r| end(r, Verdict::NotReached))
+    }
+
+    fn n_unsound(&self) -> usize {
+        self.rounds.iter().filter(|r| r.is_of_surface() && r.sound().is_none()).count()
     }
 
     /// Whether faces have stopped to help: three times as many have no smaller error, or no more
@@ -262,11 +267,14 @@ impl<'a> Search<'a> {
     fn faces_for_soundness(&self) -> Option<u32> {
         let low = self.unsound?;
         let sound = self.rounds.iter().filter(|r| r.sound().is_some() && r.faces > low);
+        let fewest = sound.min_by_key(|r| r.faces);
+        if fewest.and_then(Round::sound).is_some_and(|error| error > 1.0) {
+            // The error asks for more.
+            return None;
+        }
         let low = f64::from(low);
-        let faces = match sound.map(|r| r.faces).min() {
-            Some(high) => power(low * f64::from(high), 0.5),
-            None => SOUND_STEP * low,
-        };
+        let step = SOUND_STEPS[self.n_unsound().clamp(1, SOUND_STEPS.len()) - 1];
+        let faces = fewest.map_or(step * low, |high| power(low * f64::from(high.faces), 0.5));
         Some((faces.round() as u32).min(self.limit))
     }
 
@@ -362,6 +370,42 @@ mod tests {
         let (ending, rounds) = play(|faces| power(300.0 / faces, 3.0), 1.0, 2600);
         assert_eq!(ending.verdict, Verdict::FewestSound, "{rounds:?}");
         assert!((2600..3600).contains(&ending.faces), "{rounds:?}");
+    }
+
+    #[test]
+    fn just_below_the_fewest_sound_faces_few_more_are_tried_first() {
+        let (ending, rounds) = play(|faces| power(1000.0 / faces, 3.0), 0.6, 1100);
+        assert!((1100..1200).contains(&ending.faces), "{rounds:?}");
+        assert!(surfaces(&rounds) <= 3, "{rounds:?}");
+    }
+
+    #[test]
+    fn a_surface_that_does_is_never_given_up_for_one_with_more_faces() {
+        for seed in 0..200 {
+            let chance = |faces: f64| libm::sin(faces * 0.37 + f64::from(seed));
+            let mut rounds: Vec<Round> = Vec::new();
+            let ending = loop {
+                let (faces, is_surface) = match next(&rounds) {
+                    Step::Curves(faces) => (faces, false),
+                    Step::Surface(faces) => (faces, true),
+                    Step::End(ending) => break ending,
+                };
+                let n = f64::from(faces);
+                let curves = power(900.0 / n, 3.0) * libm::exp(0.5 * chance(n));
+                // Soundness is a matter of luck up to 2500 faces.
+                let sound = n > 2500.0 || n / 2500.0 > 0.4 + 0.6 * chance(1.7 * n);
+                let found = match is_surface {
+                    true => Found::Surface { curves, surface: Some(curves), sound },
+                    false => Found::Curves { curves },
+                };
+                rounds.push(Round { faces, found });
+                assert!(rounds.len() < 40, "{seed}: {rounds:?}");
+            };
+            let good = rounds.iter().filter(|r| r.sound().is_some_and(|error| error <= 1.0));
+            let least = good.map(|r| r.faces).min();
+            assert_eq!(least, Some(ending.faces), "{seed}: {rounds:?}");
+            assert!(surfaces(&rounds) <= MOST_SURFACES, "{seed}: {rounds:?}");
+        }
     }
 
     #[test]
