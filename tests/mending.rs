@@ -1,11 +1,12 @@
 //! Folded patches: their faces are split and the surface made again, by the program and the library.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use isospline::{Aabb, CheckParams, ClosureField, MENDS_NOTE, Options, Vec3, convert};
+use isospline::config::ModelFile;
+use isospline::{CheckParams, MENDS_NOTE, Model, Options, convert};
 use isospline_tests::{Sandbox, config_path, root};
 
 /// So few faces that patches fold where the two tori meet.
-const FACES: u32 = 400;
+const FACES: u32 = 160;
 
 /// Runs the double torus with so few faces; the exit code.
 fn run(sandbox: &Sandbox, more: &[&str]) -> i32 {
@@ -81,15 +82,11 @@ fn a_given_mesh_with_a_corner_of_two_degrees_is_kept_and_does_not_fold() {
 
 #[test]
 fn the_library_mends_folds_as_the_program_does() {
-    let field = ClosureField::new(1.0, |p: Vec3| {
-        let (x2, y2) = (p.x * p.x, p.y * p.y);
-        let ring = x2 * (x2 - 1.0) + y2;
-        ring * ring + p.z * p.z - 0.04
-    });
-    let domain = Aabb::new(Vec3::new(-1.19, -0.74, -0.22), Vec3::new(1.19, 0.74, 0.22));
-    let options = Options { faces: FACES, ..Options::new(domain) };
+    let path = config_path("double_torus");
+    let model = Model::new(ModelFile::open(path.as_ref(), &[]).unwrap()).unwrap();
+    let options = Options { faces: FACES, ..Options::new(model.domain) };
     let flips = |mends| {
-        let surface = convert(&field, &Options { mends, ..options.clone() }).unwrap();
+        let surface = convert(&model.field, &Options { mends, ..options.clone() }).unwrap();
         surface.check(&CheckParams::default()).unwrap().flipped_patches
     };
     assert!(flips(0) > 0);
