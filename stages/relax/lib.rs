@@ -111,7 +111,7 @@ impl Stage for Relax {
         counters.count("visits_without_step", at.idle_visits);
         let (surface, nu) = (&mut at.interior, &mut at.nu);
         let restored = match degree {
-            Degree::Six => conditions.restore_sextic(ctx.host, &moves, surface, nu),
+            Degree::Six => conditions.restore_sextic(ctx.host, moves, surface, nu),
             Degree::Seven => conditions.restore(ctx.host, surface, nu),
         };
         counters.merge(&restored);
