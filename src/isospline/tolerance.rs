@@ -394,9 +394,10 @@ mod tests {
                 let curves = power(900.0 / n, 3.0) * libm::exp(0.5 * chance(n));
                 // Soundness is a matter of luck up to 2500 faces.
                 let sound = n > 2500.0 || n / 2500.0 > 0.4 + 0.6 * chance(1.7 * n);
-                let found = match is_surface {
-                    true => Found::Surface { curves, surface: Some(curves), sound },
-                    false => Found::Curves { curves },
+                let found = if is_surface {
+                    Found::Surface { curves, surface: Some(curves), sound }
+                } else {
+                    Found::Curves { curves }
                 };
                 rounds.push(Round { faces, found });
                 assert!(rounds.len() < 40, "{seed}: {rounds:?}");

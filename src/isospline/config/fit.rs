@@ -79,12 +79,12 @@ mod tests {
         let turning = |overrides: &[&str]| {
             let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
             let stages = ModelFile::from_formula("x", &overrides).unwrap().stages;
-            [stages.decimate.max_turning_deg, stages.adapt.max_turning_deg]
+            format!("{} {}", stages.decimate.max_turning_deg, stages.adapt.max_turning_deg)
         };
-        assert_eq!(turning(&[]), [85.0, 100.0]);
-        assert_eq!(turning(&["target.fit=paper"]), [50.0, 60.0]);
-        assert_eq!(turning(&["target.fit=fast", "adapt.max_turning_deg=70"]), [50.0, 70.0]);
-        assert_eq!(turning(&["model.base_mesh=a.obj"]), [50.0, 60.0]);
+        assert_eq!(turning(&[]), "85 100");
+        assert_eq!(turning(&["target.fit=paper"]), "50 60");
+        assert_eq!(turning(&["target.fit=fast", "adapt.max_turning_deg=70"]), "50 70");
+        assert_eq!(turning(&["model.base_mesh=a.obj"]), "50 60");
     }
 
     #[test]
