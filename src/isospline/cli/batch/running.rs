@@ -130,9 +130,13 @@ impl Running {
     }
 }
 
+/// A new file: a run that outlived its batch goes on writing to the one that was there.
 #[expect(clippy::disallowed_methods, reason = "a log is read while it is written")]
 fn log(path: &Path) -> std::io::Result<File> {
-    File::create(path)
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
+        _ => File::create(path),
+    }
 }
 
 #[expect(clippy::disallowed_methods, reason = "times of runs are told, they change no output")]
@@ -148,4 +152,21 @@ fn signal(status: std::process::ExitStatus) -> Option<i32> {
 #[cfg(not(unix))]
 fn signal(_: std::process::ExitStatus) -> Option<i32> {
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write as _;
+
+    #[test]
+    fn what_an_earlier_run_still_says_is_not_taken_for_the_word_of_the_next() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.jsonl");
+        let mut earlier = log(&path).unwrap();
+        writeln!(earlier, "begun").unwrap();
+        writeln!(log(&path).unwrap(), "report").unwrap();
+        writeln!(earlier, "another stage").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "report\n");
+    }
 }
