@@ -1,7 +1,7 @@
 //! Edges between patches of degree 6: the rows of the G1 condition and what solves them.
 //!
 //! With first inner rows `p`, `r` of degree 5 and a cubic `mu` the condition [TK, Eq. (3)] has seven
-//! rows [derived]. Those of the ends, k = 0, 1, 5, 6, are those of septic patches: both degrees have
+//! rows \[derived\]. Those of the ends, k = 0, 1, 5, 6, are those of septic patches: both degrees have
 //! the same mixed derivatives at a corner. Of the rows k = 2, 3, 4 and the alternating sum of all
 //! seven, divided by `lambda1 - lambda0`,
 //!
