@@ -4,7 +4,7 @@ use crate::edge_end::outgoing_curve;
 use isospline_artifact::kinds::{BaseMeshView, NetworkView};
 use isospline_geometry::bezier_curve::{raise_quartic_to_septic, raise_quartic_to_sextic};
 use isospline_geometry::bezier_triangle::{
-    DEGREE, N_CONTROL, N_INTERIOR, boundary_index, interior_indices,
+    N_CONTROL, N_INTERIOR, interior_indices, net_of_boundary,
 };
 use isospline_geometry::degree_change::N_SEXTIC;
 use isospline_geometry::{HalfEdge, Vec3};
@@ -18,13 +18,7 @@ pub fn boundary_net(
     network: &NetworkView<'_>,
     face: usize,
 ) -> [Vec3; N_CONTROL] {
-    let mut net = [Vec3::zeros(); N_CONTROL];
-    for (corner, curve) in curves(mesh, network, face, raise_quartic_to_septic).iter().enumerate() {
-        for (s, &p) in curve.iter().enumerate() {
-            net[boundary_index(DEGREE, corner, s)] = p;
-        }
-    }
-    net
+    net_of_boundary(&curves(mesh, network, face, raise_quartic_to_septic))
 }
 
 /// The same of degree 6.
@@ -33,13 +27,7 @@ pub fn boundary_net_sextic(
     network: &NetworkView<'_>,
     face: usize,
 ) -> [Vec3; N_SEXTIC] {
-    let mut net = [Vec3::zeros(); N_SEXTIC];
-    for (corner, curve) in curves(mesh, network, face, raise_quartic_to_sextic).iter().enumerate() {
-        for (s, &p) in curve.iter().enumerate() {
-            net[boundary_index(6, corner, s)] = p;
-        }
-    }
-    net
+    net_of_boundary(&curves(mesh, network, face, raise_quartic_to_sextic))
 }
 
 /// The raised curves of a face, counter-clockwise.

@@ -58,6 +58,18 @@ pub const fn boundary_index(n: usize, corner: usize, s: usize) -> usize {
     index(edge_frame(n, corner, s, 0))
 }
 
+/// A net of degree `N - 1` with these curves, counter-clockwise, as its boundary, zero inside; `M` is
+/// [`n_control`] of the degree.
+pub fn net_of_boundary<const N: usize, const M: usize>(curves: &[[Vec3; N]; 3]) -> [Vec3; M] {
+    let mut net = [Vec3::zeros(); M];
+    for (corner, curve) in curves.iter().enumerate() {
+        for (s, &p) in curve.iter().enumerate() {
+            net[boundary_index(N - 1, corner, s)] = p;
+        }
+    }
+    net
+}
+
 /// Index of step `s` (0..n) of the first row inside the edge from `corner` to `corner + 1`.
 ///
 /// Step 1 is the twist point of `corner`, step `n - 2` that of `corner + 1`.

@@ -45,6 +45,17 @@ impl Degree {
         out
     }
 
+    /// A net whose points lie evenly in a plane, by slots.
+    #[cfg(test)]
+    pub(crate) fn flat_net(self) -> [Vec3; N_CONTROL] {
+        let mut net = [Vec3::zeros(); N_CONTROL];
+        let places = isospline_geometry::bezier_triangle::grid(self.number());
+        for ([_, v, w], slot) in places.zip(self.slots()) {
+            net[slot] = Vec3::new(v, w, 0.0);
+        }
+        net
+    }
+
     /// The net of `face` with its boundary in place, zero inside, by slots.
     pub(crate) fn boundary_net(
         self,

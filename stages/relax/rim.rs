@@ -138,18 +138,10 @@ fn values<const N: usize>(n: usize, t: f64) -> [f64; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use isospline_geometry::bezier_triangle::{first_inner_slot, grid};
-
-    fn flat_net(degree: Degree) -> [Vec3; N_CONTROL] {
-        let mut net = [Vec3::zeros(); N_CONTROL];
-        for ([_, v, w], slot) in grid(degree.number()).zip(degree.slots()) {
-            net[slot] = Vec3::new(v, w, 0.0);
-        }
-        net
-    }
+    use isospline_geometry::bezier_triangle::first_inner_slot;
 
     fn folds(degree: Degree, side: f64, change: impl Fn(&mut Interior)) -> usize {
-        let (rim, net) = (Rim::new(degree), flat_net(degree));
+        let (rim, net) = (Rim::new(degree), degree.flat_net());
         let places: Vec<Vec3> = rim.places(&net).collect();
         let on_boundary = |p: &Vec3| [p.x, p.y, 1.0 - p.x - p.y].iter().any(|x| x.abs() < 1e-15);
         assert!(places.len() == 69 && places.iter().all(on_boundary));

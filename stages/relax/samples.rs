@@ -185,20 +185,11 @@ fn tangent_weights(degree: Degree, at: &[f64; 3]) -> [[f64; N_CONTROL]; 2] {
 mod tests {
     use super::*;
 
-    /// A net whose points lie evenly in a plane, by slots.
-    fn flat_net(degree: Degree) -> [Vec3; N_CONTROL] {
-        let mut net = [Vec3::zeros(); N_CONTROL];
-        for ([_, v, w], slot) in grid(degree.number()).zip(degree.slots()) {
-            net[slot] = Vec3::new(v, w, 0.0);
-        }
-        net
-    }
-
     #[test]
     fn a_flat_net_is_sampled_at_its_grid_and_seen_upright_from_above_alone() {
         for degree in [Degree::Six, Degree::Seven] {
             let samples = Samples::new(12, 0.0, degree);
-            let net = flat_net(degree);
+            let net = degree.flat_net();
             let interior = interior_indices().map(|i| net[i]);
             let values = samples.of(&samples.of_boundary(&net), &interior);
             let inner = grid(12).filter(|p| p.iter().all(|&x| x > 0.0));
@@ -214,7 +205,7 @@ mod tests {
     #[test]
     fn an_even_net_over_a_flat_boundary_is_flat_and_evenly_spaced() {
         for degree in [Degree::Six, Degree::Seven] {
-            let (samples, net) = (Samples::new(12, 0.0, degree), flat_net(degree));
+            let (samples, net) = (Samples::new(12, 0.0, degree), degree.flat_net());
             let even = samples.even(&net);
             for (p, i) in even.iter().zip(interior_indices()) {
                 assert!((p - net[i]).norm() < 1e-14, "{p} instead of {}", net[i]);

@@ -3,8 +3,8 @@
 use crate::artifact;
 use isospline_geometry::Vec3;
 use isospline_geometry::bezier_curve::{raise_quartic_to_septic, raise_quartic_to_sextic};
-use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, boundary_index, interior_indices};
-use isospline_geometry::degree_change::{N_SEXTIC, lower_to_sextic};
+use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, interior_indices, net_of_boundary};
+use isospline_geometry::degree_change::lower_to_sextic;
 
 /// How the patches were built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,13 +68,8 @@ impl PatchesView<'_> {
     /// An edge's curve is raised from its lower vertex and copied, so the nets of neighbouring
     /// faces carry the same bits along their shared edge.
     pub fn net(&self, face: usize) -> [Vec3; N_CONTROL] {
-        let mut net = [Vec3::zeros(); N_CONTROL];
-        for corner in 0..3 {
-            let curve = self.raised_edge(face, corner, raise_quartic_to_septic);
-            for (s, point) in curve.into_iter().enumerate() {
-                net[boundary_index(DEGREE, corner, s)] = point;
-            }
-        }
+        let curve = |corner| self.raised_edge(face, corner, raise_quartic_to_septic);
+        let mut net = net_of_boundary(&[0, 1, 2].map(curve));
         let inner = self.interior[face].chunks_exact(3);
         for (slot, p) in interior_indices().into_iter().zip(inner) {
             net[slot] = Vec3::new(p[0], p[1], p[2]);
@@ -93,13 +88,8 @@ impl PatchesView<'_> {
         if self.degree() != 6 {
             return self.net(face).to_vec();
         }
-        let mut net = [Vec3::zeros(); N_SEXTIC];
-        for corner in 0..3 {
-            let curve = self.raised_edge(face, corner, raise_quartic_to_sextic);
-            for (s, point) in curve.into_iter().enumerate() {
-                net[boundary_index(6, corner, s)] = point;
-            }
-        }
+        let curve = |corner| self.raised_edge(face, corner, raise_quartic_to_sextic);
+        let net = net_of_boundary(&[0, 1, 2].map(curve));
         let row = &self.interior[face];
         let interior = |i: usize| Vec3::new(row[3 * i], row[3 * i + 1], row[3 * i + 2]);
         lower_to_sextic(net, &std::array::from_fn(interior)).to_vec()
