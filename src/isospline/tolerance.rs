@@ -313,26 +313,33 @@ fn power(base: f64, exponent: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Plays a search on a surface whose curves and patches have these errors; sound from
-    /// `least_sound` faces on.
-    fn play(error: impl Fn(f64) -> f64, ratio: f64, least_sound: u32) -> (Ending, Vec<Round>) {
+    /// Plays a search of fewer than `most` rounds; `found` tells what a number of faces gives, and
+    /// whether a surface is made of it.
+    fn play_with(most: usize, found: impl Fn(u32, bool) -> Found) -> (Ending, Vec<Round>) {
         let mut rounds = Vec::new();
-        for _ in 0..40 {
+        loop {
             let (faces, is_surface) = match next(&rounds) {
                 Step::Curves(faces) => (faces, false),
                 Step::Surface(faces) => (faces, true),
                 Step::End(ending) => return (ending, rounds),
             };
+            rounds.push(Round { faces, found: found(faces, is_surface) });
+            assert!(rounds.len() < most, "the search does not end: {rounds:?}");
+        }
+    }
+
+    /// Plays a search on a surface whose curves and patches have these errors; sound from
+    /// `least_sound` faces on.
+    fn play(error: impl Fn(f64) -> f64, ratio: f64, least_sound: u32) -> (Ending, Vec<Round>) {
+        play_with(40, |faces, is_surface| {
             let curves = error(f64::from(faces));
-            let found = if is_surface {
+            if is_surface {
                 let sound = faces >= least_sound;
                 Found::Surface { curves, surface: Some(ratio * curves), sound }
             } else {
                 Found::Curves { curves }
-            };
-            rounds.push(Round { faces, found });
-        }
-        panic!("the search does not end: {rounds:?}");
+            }
+        })
     }
 
     fn surfaces(rounds: &[Round]) -> usize {
@@ -383,25 +390,17 @@ mod tests {
     fn a_surface_that_does_is_never_given_up_for_one_with_more_faces() {
         for seed in 0..200 {
             let chance = |faces: f64| libm::sin(faces * 0.37 + f64::from(seed));
-            let mut rounds: Vec<Round> = Vec::new();
-            let ending = loop {
-                let (faces, is_surface) = match next(&rounds) {
-                    Step::Curves(faces) => (faces, false),
-                    Step::Surface(faces) => (faces, true),
-                    Step::End(ending) => break ending,
-                };
+            let (ending, rounds) = play_with(40, |faces, is_surface| {
                 let n = f64::from(faces);
                 let curves = power(900.0 / n, 3.0) * libm::exp(0.5 * chance(n));
                 // Soundness is a matter of luck up to 2500 faces.
                 let sound = n > 2500.0 || n / 2500.0 > 0.4 + 0.6 * chance(1.7 * n);
-                let found = if is_surface {
+                if is_surface {
                     Found::Surface { curves, surface: Some(curves), sound }
                 } else {
                     Found::Curves { curves }
-                };
-                rounds.push(Round { faces, found });
-                assert!(rounds.len() < 40, "{seed}: {rounds:?}");
-            };
+                }
+            });
             let good = rounds.iter().filter(|r| r.sound().is_some_and(|error| error <= 1.0));
             let least = good.map(|r| r.faces).min();
             assert_eq!(least, Some(ending.faces), "{seed}: {rounds:?}");
@@ -418,22 +417,14 @@ mod tests {
 
     #[test]
     fn where_more_faces_are_refused_the_most_that_are_not_are_taken() {
-        let mut rounds: Vec<Round> = Vec::new();
-        let ending = loop {
-            let (faces, is_surface) = match next(&rounds) {
-                Step::Curves(faces) => (faces, false),
-                Step::Surface(faces) => (faces, true),
-                Step::End(ending) => break ending,
-            };
+        let (ending, rounds) = play_with(20, |faces, is_surface| {
             let curves = power(9000.0 / f64::from(faces), 3.0);
-            let found = match is_surface {
+            match is_surface {
                 _ if faces > 2500 => Found::TooMany,
                 true => Found::Surface { curves, surface: Some(curves), sound: true },
                 false => Found::Curves { curves },
-            };
-            rounds.push(Round { faces, found });
-            assert!(rounds.len() < 20, "{rounds:?}");
-        };
+            }
+        });
         assert_eq!(ending.verdict, Verdict::NotReached, "{rounds:?}");
         assert!((2100..=2500).contains(&ending.faces), "{rounds:?}");
     }
