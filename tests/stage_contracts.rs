@@ -86,7 +86,7 @@ fn chain() -> &'static Chain {
         let vertices = (VertexSystems::KIND, &vertex_systems as &dyn SectionSource);
         let edge_systems = run::<EdgeSystemsStage>(&[base, curves, fit, vertices]);
         let edges = (EdgeSystems::KIND, &edge_systems as &dyn SectionSource);
-        let patches = run::<Fairing>(&[base, curves, vertices, edges]);
+        let patches = run::<Fairing>(&[base, curves, fit, vertices, edges]);
         Chain { base_mesh, curvature, network, g0_fit, vertex_systems, edge_systems, patches }
     })
 }
@@ -155,6 +155,7 @@ mod fairing {
     fn case() -> Fixture<Fairing> {
         fixture()
             .with_input(chain().network.clone())
+            .with_input(chain().g0_fit.clone())
             .with_input(chain().vertex_systems.clone())
             .with_input(chain().edge_systems.clone())
     }

@@ -35,6 +35,12 @@ impl Samples {
         &self.weights
     }
 
+    /// Sums over the samples of the products of `B_1`, `B_2` and `B_3`.
+    pub fn products(&self) -> [[f64; 3]; 3] {
+        let product = |i: usize, j: usize| self.weights.iter().map(|w| w[i + 1] * w[j + 1]).sum();
+        std::array::from_fn(|i| std::array::from_fn(|j| product(i, j)))
+    }
+
     /// Points of a quartic at the samples.
     pub fn curve_points(&self, q: &[Vec3; 5]) -> impl Iterator<Item = Vec3> {
         self.weights

@@ -3,9 +3,7 @@
 use crate::edge_end::outgoing_curve;
 use isospline_artifact::kinds::{BaseMeshView, NetworkView};
 use isospline_geometry::bezier_curve::{raise_quartic_to_septic, raise_quartic_to_sextic};
-use isospline_geometry::bezier_triangle::{
-    N_CONTROL, N_INTERIOR, interior_indices, net_of_boundary,
-};
+use isospline_geometry::bezier_triangle::{N_CONTROL, N_INTERIOR, net_of_boundary};
 use isospline_geometry::degree_change::N_SEXTIC;
 use isospline_geometry::{HalfEdge, Vec3};
 use std::ops::Range;
@@ -54,11 +52,11 @@ pub fn needed_edges(mesh: &BaseMeshView<'_>, faces: Range<usize>) -> Vec<usize> 
     mesh.edge_of[3 * faces.start..3 * faces.end].iter().map(|&e| e as usize).collect()
 }
 
-/// The 15 interior points of a net as a row.
-pub fn flat_interior(net: &[Vec3; N_CONTROL]) -> [f64; 3 * N_INTERIOR] {
+/// Interior points as a row.
+pub fn flat_interior(interior: &[Vec3; N_INTERIOR]) -> [f64; 3 * N_INTERIOR] {
     let mut row = [0.0; 3 * N_INTERIOR];
-    for (slot, i) in interior_indices().into_iter().enumerate() {
-        row[3 * slot..3 * slot + 3].copy_from_slice(net[i].as_slice());
+    for (place, point) in row.chunks_exact_mut(3).zip(interior) {
+        place.copy_from_slice(point.as_slice());
     }
     row
 }

@@ -15,21 +15,23 @@ use isospline_implicit::SymMat3;
 /// Newton-Lagrange steps at most; 2.4 are needed on average, 5 at most on sound edges.
 const MAX_ITERATIONS: u32 = 30;
 /// The paper's stop: change of unknowns and multipliers.
-const STEP_TOLERANCE: f64 = 1e-6;
+pub(crate) const STEP_TOLERANCE: f64 = 1e-6;
 /// Scaled residual of the curvature conditions at the end; a residual `c` costs about `50 c`
 /// degrees of G1 angle.
-const CONDITION_TOLERANCE: f64 = 1e-13;
+pub(crate) const CONDITION_TOLERANCE: f64 = 1e-13;
 /// Tangent lengths outside this range, times the chord, come only from bad base edges.
-const LENGTH_RANGE: [f64; 2] = [0.08, 0.75];
+pub(crate) const LENGTH_RANGE: [f64; 2] = [0.08, 0.75];
 /// Lets conditions that coincide (equal normals on planes and along rulings) be solved: both
 /// multipliers then share the load. Small beside the squared turn of normals that matter.
-const COINCIDENT: f64 = 1e-13;
+pub(crate) const COINCIDENT: f64 = 1e-13;
 /// Farthest place of `q2` from where least squares without conditions puts it, times the chord;
 /// sound edges stay below 0.1. Where curvature starts inside an edge, at the rim of a plane say,
 /// the conditions may be met far to the side only.
-const Q2_RANGE: f64 = 0.25;
+pub(crate) const Q2_RANGE: f64 = 0.25;
 /// The same for curves from the table: beyond it the edge has no curve.
 const Q2_LIMIT: f64 = 1.0;
+/// Chord in a tangent plane, of the chord, below which an edge has no direction there.
+pub(crate) const SHORTEST_TANGENT: f64 = 1e-6;
 /// Tangent lengths tried, at both ends, where the iteration finds no sound curve: short ones need
 /// less room for `q2`.
 const TABLE: [f64; 8] = [0.25, 0.18, 0.12, 0.08, 0.05, 0.03, 0.35, 0.5];
@@ -106,7 +108,7 @@ impl Edge {
         let d = ends.points[1] - ends.points[0];
         let chord = d.norm();
         let q4 = d / chord;
-        let tangent = |n: &Vec3| (q4 - q4.dot(n) * n).try_normalize(1e-6);
+        let tangent = |n: &Vec3| (q4 - q4.dot(n) * n).try_normalize(SHORTEST_TANGENT);
         let tangents = [tangent(&ends.normals[0])?, tangent(&ends.normals[1])?];
         let curvature = |k: usize| chord * apply(&ends.shapes[k], &tangents[k], &tangents[k]);
         Some(Self {

@@ -1,6 +1,7 @@
 //! Bézier curves of fixed degree.
 
 use crate::Vec3;
+use std::ops::{Add, Div, Mul};
 
 /// Binomial coefficients up to 14, exact in f64.
 pub fn binomial(n: usize, k: usize) -> f64 {
@@ -28,16 +29,20 @@ pub fn evaluate(control: &[Vec3], t: f64) -> Vec3 {
 ///
 /// The sums run from `q0` to `q4`, so the two directions of a curve agree only up to rounding:
 /// raise an edge's curve once, from its lower vertex, and copy.
-#[inline]
-pub fn raise_quartic_to_septic(q: &[Vec3; 5]) -> [Vec3; 8] {
+#[expect(clippy::inline_always, reason = "also of many curves together, for wide vectors")]
+#[inline(always)]
+pub fn raise_quartic_to_septic<V>(q: &[V; 5]) -> [V; 8]
+where
+    V: Copy + Add<Output = V> + Mul<f64, Output = V> + Div<f64, Output = V>,
+{
     [
         q[0],
-        (3.0 * q[0] + 4.0 * q[1]) / 7.0,
+        (q[0] * 3.0 + q[1] * 4.0) / 7.0,
         (q[0] * 3.0 + q[1] * 12.0 + q[2] * 6.0) / 21.0,
         (q[0] + q[1] * 12.0 + q[2] * 18.0 + q[3] * 4.0) / 35.0,
         (q[1] * 4.0 + q[2] * 18.0 + q[3] * 12.0 + q[4]) / 35.0,
         (q[2] * 6.0 + q[3] * 12.0 + q[4] * 3.0) / 21.0,
-        (4.0 * q[3] + 3.0 * q[4]) / 7.0,
+        (q[3] * 4.0 + q[4] * 3.0) / 7.0,
         q[4],
     ]
 }

@@ -10,6 +10,7 @@
 )]
 
 use crate::circular::{Circular, Cosine, Sine};
+use crate::field::BLOCK;
 use crate::instruction_set::InstructionSet;
 use crate::operation::{self, BinaryOp, UnaryOp};
 use crate::tape::{Instruction, Op, Tape};
@@ -36,6 +37,46 @@ pub(crate) fn evaluate<const K: usize, T>(
     to_result: impl Fn([f64; K]) -> T,
 ) {
     assert_eq!(points.len(), out.len(), "one result a point");
+    let mut take = |at: usize, outputs: [&[f64]; K]| {
+        for (lane, out) in out[at..][..outputs[0].len()].iter_mut().enumerate() {
+            *out = to_result(outputs.map(|output| output[lane]));
+        }
+    };
+    let fill = |at: usize, axis: usize, lanes: &mut [f64]| {
+        for (lane, point) in lanes.iter_mut().zip(&points[at..]) {
+            *lane = point[axis];
+        }
+    };
+    in_blocks(tape, points.len(), &fill, &mut take);
+}
+
+/// Evaluates `tape` at the first `n` points of a block, coordinates in and outputs out one after
+/// another.
+pub(crate) fn evaluate_block<const K: usize>(
+    tape: &Tape,
+    n: usize,
+    points: &[[f64; BLOCK]; 3],
+    out: &mut [[f64; BLOCK]; K],
+) {
+    let mut take = |at: usize, outputs: [&[f64]; K]| {
+        for (out, lanes) in out.iter_mut().zip(outputs) {
+            out[at..][..lanes.len()].copy_from_slice(lanes);
+        }
+    };
+    let fill = |at: usize, axis: usize, lanes: &mut [f64]| {
+        lanes.copy_from_slice(&points[axis][at..][..lanes.len()]);
+    };
+    in_blocks(tape, n, &fill, &mut take);
+}
+
+/// Runs `tape` on `n_points` points in blocks. Of those from a first one on `fill` writes one
+/// coordinate and `take` is given the outputs.
+fn in_blocks<const K: usize>(
+    tape: &Tape,
+    n_points: usize,
+    fill: &impl Fn(usize, usize, &mut [f64]),
+    take: &mut impl FnMut(usize, [&[f64]; K]),
+) {
     let lanes_in_cache = REGISTER_BYTES / (tape.n_registers * size_of::<f64>());
     let most = [64, 32, 16].into_iter().find(|&lanes| lanes <= lanes_in_cache).unwrap_or(8);
     let mut scratch = SCRATCH.take();
@@ -47,43 +88,38 @@ pub(crate) fn evaluate<const K: usize, T>(
     let start = scratch.as_ptr().align_offset(CACHE_LINE * size_of::<f64>()).min(CACHE_LINE);
     let file = &mut scratch[start..][..n_lanes];
     let mut at = 0;
-    while at < points.len() {
-        let left = points.len() - at;
-        let (points, out) = (&points[at..], &mut out[at..]);
+    while at < n_points {
+        let left = n_points - at;
+        let fill = |axis: usize, lanes: &mut [f64]| fill(at, axis, lanes);
+        let mut take = |outputs: [&[f64]; K]| take(at, outputs);
         at += match left.next_power_of_two().clamp(8, most) {
-            64 => block::<64, K, T>(tape, file, points, out, &to_result),
-            32 => block::<32, K, T>(tape, file, points, out, &to_result),
-            16 => block::<16, K, T>(tape, file, points, out, &to_result),
-            _ => block::<8, K, T>(tape, file, points, out, &to_result),
+            64 => block::<64, K>(tape, file, left, &fill, &mut take),
+            32 => block::<32, K>(tape, file, left, &fill, &mut take),
+            16 => block::<16, K>(tape, file, left, &fill, &mut take),
+            _ => block::<8, K>(tape, file, left, &fill, &mut take),
         };
     }
     SCRATCH.set(scratch);
 }
 
-/// The first `N` points or fewer; returns how many.
-fn block<const N: usize, const K: usize, T>(
+/// The first `N` of `left` points or fewer; returns how many.
+fn block<const N: usize, const K: usize>(
     tape: &Tape,
     file: &mut [f64],
-    points: &[Vec3],
-    out: &mut [T],
-    to_result: &impl Fn([f64; K]) -> T,
+    left: usize,
+    fill: &impl Fn(usize, &mut [f64]),
+    take: &mut impl FnMut([&[f64]; K]),
 ) -> usize {
     let file = &mut file.as_chunks_mut::<N>().0[..tape.n_registers];
-    let n = points.len().min(N);
-    let points = &points[..n];
+    let n = left.min(N);
     for &(axis, register) in &tape.inputs {
         let (used, spare) = file[register as usize].split_at_mut(n);
-        for (lane, point) in used.iter_mut().zip(points) {
-            *lane = point[axis as usize];
-        }
+        fill(axis as usize, used);
         // Idle lanes hold a real point: values far off would cost time (subnormal numbers).
-        spare.fill(points[n - 1][axis as usize]);
+        spare.fill(used[n - 1]);
     }
     run(&tape.instructions, file, n);
-    let outputs: [&[f64; N]; K] = std::array::from_fn(|k| &file[tape.outputs[k] as usize]);
-    for (lane, out) in out[..n].iter_mut().enumerate() {
-        *out = to_result(outputs.map(|output| output[lane]));
-    }
+    take(std::array::from_fn(|k| &file[tape.outputs[k] as usize][..n]));
     n
 }
 
@@ -327,6 +363,21 @@ mod tests {
         }
         for n in [7, 15, 45, 100] {
             assert_eq!(results(&tape, &points[..n]), together[..n]);
+        }
+    }
+
+    #[test]
+    fn blocks_of_coordinates_give_the_bits_of_points() {
+        let (tape, points) = (tape(), points(BLOCK));
+        let together = results(&tape, &points);
+        let axes = [0, 1, 2].map(|axis| std::array::from_fn(|i| points[i][axis]));
+        for n in [1, 9, 40, BLOCK] {
+            let mut out = [[0.0; BLOCK]; 10];
+            evaluate_block(&tape, n, &axes, &mut out);
+            for (i, expected) in together[..n].iter().enumerate() {
+                let bits = |f: f64| if f.is_nan() { u64::MAX } else { f.to_bits() };
+                assert_eq!(out.map(|lanes| bits(lanes[i])), *expected);
+            }
         }
     }
 

@@ -35,7 +35,7 @@ use crate::interval_lanes::enclose_all;
 use crate::kinks;
 use crate::lowering::{self, Target};
 use crate::tape::Tape;
-use crate::{AffineJet, Field, Interval, IntervalJet, Jet1, Jet2};
+use crate::{AffineJet, BLOCK, Field, Interval, IntervalJet, Jet1, Jet2};
 use crate::{canonical, derivative, parser};
 use isospline_geometry::Vec3;
 use std::collections::BTreeMap;
@@ -163,6 +163,10 @@ impl Field for Formula {
             value: f,
             gradient: Vec3::new(x, y, z),
         });
+    }
+
+    fn gradient_block(&self, n: usize, points: &[[f64; BLOCK]; 3], out: &mut [[f64; BLOCK]; 4]) {
+        evaluator::evaluate_block(self.gradient_tape(), n, points, out);
     }
 
     fn hessians(&self, points: &[Vec3], out: &mut [Jet2]) {

@@ -36,7 +36,7 @@ mod tape;
 pub use affine::{Affine, AffineJet};
 pub use bounds::{BoundsError, auto_box};
 pub use closure::ClosureField;
-pub use field::{Field, Jet1, Jet2, Oriented, SymMat3};
+pub use field::{BLOCK, Field, Jet1, Jet2, Oriented, SymMat3};
 pub use foreign::{ForeignError, ForeignErrorKind, ForeignFormat, ForeignModel};
 pub use formula::Formula;
 pub use formula_error::{FormulaError, FormulaErrorKind};

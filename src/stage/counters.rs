@@ -26,8 +26,10 @@ impl Counters {
 
     /// Raises a maximum.
     pub fn max(&mut self, name: &str, value: f64) {
-        let old = self.maxima.entry(name.to_owned()).or_insert(value);
-        *old = old.max(value);
+        match self.maxima.get_mut(name) {
+            Some(old) => *old = old.max(value),
+            None => _ = self.maxima.insert(name.to_owned(), value),
+        }
     }
 
     /// Takes in the counters of another task.
@@ -39,8 +41,10 @@ impl Counters {
 }
 
 fn add(map: &mut BTreeMap<String, u64>, name: &str, n: u64) {
-    if n > 0 {
-        *map.entry(name.to_owned()).or_default() += n;
+    match map.get_mut(name) {
+        Some(sum) => *sum += n,
+        None if n > 0 => _ = map.insert(name.to_owned(), n),
+        None => {}
     }
 }
 

@@ -12,7 +12,6 @@ mod free_vertices;
 pub mod freeze;
 mod gate;
 mod improve;
-mod lanes;
 mod merging;
 pub mod order;
 mod params;
@@ -40,7 +39,7 @@ pub struct Adapt {
 
 impl Stage for Adapt {
     const NAME: &'static str = "adapt";
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
     type Params = AdaptParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();

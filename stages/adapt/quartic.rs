@@ -1,8 +1,8 @@
 //! The quartic of [TK, Eq. (9)] from few samples, of eight edges at a time.
 #![expect(clippy::inline_always, reason = "kernels must be compiled for the widest vectors whole")]
 
-use crate::lanes::{Lanes, Mask, N, Vectors};
 use crate::vertex::Vertex;
+use isospline_fitting::lanes::{Lanes, Mask, N, Vectors};
 use isospline_geometry::Vec3;
 use isospline_implicit::{Kernel, run_widest};
 

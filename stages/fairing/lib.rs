@@ -7,13 +7,12 @@ pub use error::FairingError;
 pub use params::FairingParams;
 
 use isospline_artifact::kinds::{
-    BaseMeshView, EdgeSystemsView, NetworkView, PatchMeta, Patches, Scheme, VertexSystemsView,
+    BaseMeshView, EdgeSystemsView, G0FitView, NetworkView, PatchMeta, Patches, Scheme,
+    VertexSystemsView,
 };
+use isospline_fitting::innermost::Innermost;
 use isospline_fitting::net::{flat_interior, needed_edges, point};
-use isospline_fitting::patch_fit::{PatchFit, innermost_fit};
-use isospline_fitting::projection::project_all;
-use isospline_fitting::start::start_nets;
-use isospline_geometry::bezier_triangle::{DEGREE, N_CONTROL, first_inner_index};
+use isospline_geometry::bezier_triangle::{DEGREE, N_INTERIOR, first_inner_slot};
 use isospline_geometry::{HalfEdge, Vec3};
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
@@ -24,15 +23,15 @@ use std::ops::Range;
 /// Brings the G1 surface back to the error of its boundary curves.
 #[derive(Clone, Debug)]
 pub struct Fairing {
-    fit: PatchFit<3>,
+    innermost: Innermost,
 }
 
 impl Stage for Fairing {
     const NAME: &'static str = "fairing";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
     type Params = FairingParams;
     type Whole<'a> = (BaseMeshView<'a>,);
-    type Rows<'a> = (NetworkView<'a>, VertexSystemsView<'a>, EdgeSystemsView<'a>);
+    type Rows<'a> = (NetworkView<'a>, G0FitView<'a>, VertexSystemsView<'a>, EdgeSystemsView<'a>);
     type Output = Patches;
     type Error = FairingError;
 
@@ -41,7 +40,7 @@ impl Stage for Fairing {
         params: &FairingParams,
         _: (BaseMeshView<'_>,),
     ) -> Result<Self, FairingError> {
-        Ok(Self { fit: innermost_fit(params.grid) })
+        Ok(Self { innermost: Innermost::new(params.grid) })
     }
 
     fn plan(&self, (mesh,): (BaseMeshView<'_>,), rows_per_task: usize) -> Plan {
@@ -66,27 +65,18 @@ impl Stage for Fairing {
 
     fn process(
         &self,
-        ctx: &Ctx<'_>,
+        _: &Ctx<'_>,
         (mesh,): (BaseMeshView<'_>,),
-        (network, vertices, edges): Self::Rows<'_>,
+        (network, g0_fit, vertices, edges): Self::Rows<'_>,
         task: &Task,
     ) -> Result<Piece<Patches>, FairingError> {
         let mut piece = Piece { rows: copied(&mesh, &network, task), ..Piece::default() };
-        let faces = task.writes[2].clone();
-        let n_samples = self.fit.n_samples();
-        let mut targets = vec![Vec3::zeros(); faces.len() * n_samples];
-        let mut nets = Vec::with_capacity(faces.len());
-        for (face, targets) in faces.zip(targets.chunks_exact_mut(n_samples)) {
-            let (mut net, start) = start_nets(&mesh, &network, face);
-            self.fit.sample(&start, targets);
-            place_inner_rows(&mesh, &vertices, &edges, face, &mut net);
-            nets.push(net);
-        }
-        let projected = project_all(ctx.field, mesh.bounds[0].diagonal, &mut targets);
-        piece.counters.repair("samples_off_surface", projected.failed as u64);
-        for (net, targets) in nets.iter_mut().zip(targets.chunks_exact(n_samples)) {
-            self.fit.fit(net, targets);
-            piece.rows.interior.push(flat_interior(net));
+        for face in task.writes[5].clone() {
+            let before = std::array::from_fn(|slot| point(&g0_fit.interior[face], slot));
+            let mut interior = before;
+            place_inner_rows(&mesh, &vertices, &edges, face, &mut interior);
+            self.innermost.place(&before, &mut interior);
+            piece.rows.interior.push(flat_interior(&interior));
         }
         Ok(piece)
     }
@@ -95,13 +85,13 @@ impl Stage for Fairing {
 fn needs(mesh: &BaseMeshView<'_>, faces: Range<usize>, copied_edges: Range<usize>) -> Vec<Need> {
     let edges = needed_edges(mesh, faces.clone());
     let star_rows = mesh.star_row[3 * faces.start..3 * faces.end].iter().map(|&r| r as usize);
-    let curves = edges.iter().copied().chain(copied_edges).collect();
     let need = |input, section, rows| Need { input, section, rows: ranges(rows) };
     vec![
-        need(0, "control", curves),
-        need(1, "twist", star_rows.collect()),
-        need(2, "left", edges.clone()),
-        need(2, "right", edges),
+        need(0, "control", copied_edges.collect()),
+        need(1, "interior", faces.collect()),
+        need(2, "twist", star_rows.collect()),
+        need(3, "left", edges.clone()),
+        need(3, "right", edges),
     ]
 }
 
@@ -130,18 +120,18 @@ fn place_inner_rows(
     vertices: &VertexSystemsView<'_>,
     edges: &EdgeSystemsView<'_>,
     face: usize,
-    net: &mut [Vec3; N_CONTROL],
+    interior: &mut [Vec3; N_INTERIOR],
 ) {
     for corner in 0..3 {
         let h = HalfEdge::new(face as u32, corner as u32);
         let twist = vertices.twist[mesh.star_row[h.row()] as usize];
-        net[first_inner_index(DEGREE, corner, 1)] = twist.into();
+        interior[first_inner_slot(corner, 1)] = twist.into();
         let e = mesh.edge_of[h.row()] as usize;
         let is_left = mesh.edge_half[e][0] == h.0;
         for s in 0..3 {
             // Rows run along the edge; the right face sees them from the other end.
             let p = if is_left { point(&edges.left[e], s) } else { point(&edges.right[e], 2 - s) };
-            net[first_inner_index(DEGREE, corner, 2 + s)] = p;
+            interior[first_inner_slot(corner, 2 + s)] = p;
         }
     }
 }

@@ -7,7 +7,8 @@ use isospline_stage::Params;
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FairingParams {
-    /// Steps a side of the barycentric sample grid; 8 to 64, default 8.
+    /// Steps a side of the barycentric grid on which the patch of `g0_fit` is followed; 8 to 64,
+    /// default 8. That of `g0_fit` makes it as near to the surface as that patch lets it be.
     pub grid: u32,
 }
 

@@ -7,12 +7,13 @@ pub use error::G0FitError;
 pub use params::G0FitParams;
 
 use isospline_artifact::kinds::{BaseMeshView, FaceFit, G0Fit, NetworkView};
+use isospline_fitting::lanes::N;
 use isospline_fitting::net::{flat_interior, needed_edges};
-use isospline_fitting::patch_fit::{PatchFit, interior_fit};
+use isospline_fitting::patch_fit::{Distance, PatchFit, interior_fit};
 use isospline_fitting::projection::project_all;
 use isospline_fitting::start::start_nets;
 use isospline_geometry::Vec3;
-use isospline_geometry::bezier_triangle::{N_CONTROL, N_INTERIOR};
+use isospline_geometry::bezier_triangle::{N_INTERIOR, interior_indices};
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
 
@@ -24,7 +25,7 @@ pub struct G0FitStage {
 
 impl Stage for G0FitStage {
     const NAME: &'static str = "g0_fit";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
     type Params = G0FitParams;
     type Whole<'a> = (BaseMeshView<'a>,);
     type Rows<'a> = (NetworkView<'a>,);
@@ -61,37 +62,19 @@ impl Stage for G0FitStage {
         let faces = task.writes[0].clone();
         let n_samples = self.fit.n_samples();
         let mut targets = vec![Vec3::zeros(); faces.len() * n_samples];
-        let mut nets = Vec::with_capacity(faces.len());
-        for (face, targets) in faces.zip(targets.chunks_exact_mut(n_samples)) {
-            let (net, start) = start_nets(&mesh, &network, face);
-            self.fit.sample(&start, targets);
-            nets.push(net);
-        }
+        let (mut nets, starts) = start_nets(&mesh, &network, faces.clone());
+        self.fit.sample(&starts, &mut targets);
         let diagonal = mesh.bounds[0].diagonal;
         let projected = project_all(ctx.field, diagonal, &mut targets);
         let mut piece = Piece::<G0Fit>::default();
         piece.counters.repair("samples_off_surface", projected.failed as u64);
-        for (net, targets) in nets.iter_mut().zip(targets.chunks_exact(n_samples)) {
-            self.fit.fit(net, targets);
-            piece.rows.interior.push(flat_interior(net));
-            let fit = self.distance(net, targets);
-            piece.counters.max("g0_distance_max_rel", fit.max / diagonal);
-            piece.rows.fit.push(fit);
+        for Distance { max, rms } in self.fit.fit(&mut nets, &targets) {
+            piece.counters.max("g0_distance_max_rel", max / diagonal);
+            piece.rows.fit.push(FaceFit { max, rms });
         }
+        let slots = interior_indices();
+        let interior = |k: usize| slots.map(|i| nets[k / N][i].get(k % N));
+        piece.rows.interior = (0..faces.len()).map(|k| flat_interior(&interior(k))).collect();
         Ok(piece)
-    }
-}
-
-impl G0FitStage {
-    fn distance(&self, net: &[Vec3; N_CONTROL], targets: &[Vec3]) -> FaceFit {
-        let mut points = vec![Vec3::zeros(); targets.len()];
-        self.fit.sample(net, &mut points);
-        let square = |(p, t): (&Vec3, &Vec3)| (p - t).norm_squared();
-        let squares: Vec<f64> = points.iter().zip(targets).map(square).collect();
-        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-        FaceFit {
-            max: squares.iter().fold(0.0, |acc: f64, s| acc.max(*s)).sqrt(),
-            rms: mean.sqrt(),
-        }
     }
 }

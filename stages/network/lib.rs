@@ -12,7 +12,8 @@ use isospline_artifact::kinds::{
 use isospline_fitting::curve_samples::Samples;
 use isospline_fitting::normal_curve::slant::Slant;
 use isospline_fitting::normal_curve::{NormalCurve, NormalEdge, NormalFit, NormalOptions};
-use isospline_fitting::paper_curve::{Ends, Solution, fit_curve};
+use isospline_fitting::paper_curve::{Ends, Solution};
+use isospline_fitting::paper_curves::fit_curves;
 use isospline_fitting::projection::project_all;
 use isospline_geometry::Vec3;
 use isospline_implicit::Jet1;
@@ -30,7 +31,7 @@ pub struct NetworkStage {
 
 impl Stage for NetworkStage {
     const NAME: &'static str = "network";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
     type Params = NetworkParams;
     type Whole<'a> = (BaseMeshView<'a>,);
     type Rows<'a> = (CurvatureView<'a>,);
@@ -96,8 +97,7 @@ impl NetworkStage {
         all: &[Ends],
     ) -> Vec<Option<Solution>> {
         let targets = self.targets(ctx, mesh, &mesh.bounds[0], edges);
-        let targets = targets.chunks_exact(self.samples.len());
-        all.iter().zip(targets).map(|(ends, t)| fit_curve(ends, &self.samples, t)).collect()
+        fit_curves(all, &self.samples, &targets)
     }
 
     /// Projections of the inner sample points of the chords, edge after edge.

@@ -27,7 +27,7 @@ pub struct Project;
 
 impl Stage for Project {
     const NAME: &'static str = "project";
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
     type Params = ProjectParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();

@@ -170,7 +170,8 @@ impl Conditions<'_> {
                 *p = interior[i];
             }
         }
-        flat_interior(&raise_sextic(&net))
+        let raised = raise_sextic(&net);
+        flat_interior(&slots.map(|i| raised[i]))
     }
 }
 
