@@ -74,57 +74,53 @@ impl TriangleMesh {
     /// The first [`Defect`] in face order that keeps the faces from being oriented and manifold
     /// along their edges.
     pub fn opposites(&self) -> Result<Vec<u32>, Defect> {
-        let (first, leaving) = self.leaving_half_edges()?;
-        let leaving_from =
-            |v: u32| &leaving[first[v as usize] as usize..first[v as usize + 1] as usize];
+        let first = self.rows_by_lowest()?;
+        let mut end = first.clone();
+        let mut met = vec![Met { other: BORDER, halves: [BORDER; 2] }; 3 * self.faces.len()];
         let mut opposite = vec![BORDER; 3 * self.faces.len()];
-        for (f, face) in (0u32..).zip(&self.faces) {
-            for k in 0..3 {
-                let h = HalfEdge::new(f, k);
-                let (from, to) = (face[k as usize], face[(k as usize + 1) % 3]);
-                // Rows of a vertex ascend, so the second face along a directed edge finds the
-                // first.
-                let mut earlier = leaving_from(from).iter().take_while(|o| o.half < h.0);
-                if earlier.any(|o| o.to == to) {
-                    return Err(Defect::DoubledHalfEdge { face: f, from, to });
-                }
-                if let Some(o) = leaving_from(to).iter().find(|o| o.to == from) {
-                    opposite[h.row()] = o.half;
+        for (f, &[a, b, c]) in (0u32..).zip(&self.faces) {
+            for (h, from, to) in [(3 * f, a, b), (3 * f + 1, b, c), (3 * f + 2, c, a)] {
+                let (lowest, other) = (from.min(to) as usize, from.max(to));
+                let [side, across] = if from < to { [0, 1] } else { [1, 0] };
+                let rows = first[lowest] as usize..end[lowest] as usize;
+                if let Some(edge) = met[rows].iter_mut().find(|edge| edge.other == other) {
+                    if edge.halves[side] != BORDER {
+                        return Err(Defect::DoubledHalfEdge { face: f, from, to });
+                    }
+                    edge.halves[side] = h;
+                    opposite[h as usize] = edge.halves[across];
+                    opposite[edge.halves[across] as usize] = h;
+                } else {
+                    let edge = &mut met[end[lowest] as usize];
+                    edge.other = other;
+                    edge.halves[side] = h;
+                    end[lowest] += 1;
                 }
             }
         }
         Ok(opposite)
     }
 
-    /// Half-edges sorted by their origin: first row of each vertex (and the end), and the rows,
-    /// each with the vertex that the half-edge reaches.
-    fn leaving_half_edges(&self) -> Result<(Vec<u32>, Vec<Leaving>), Defect> {
+    /// First row of each vertex when half-edges are sorted by their lower end.
+    fn rows_by_lowest(&self) -> Result<Vec<u32>, Defect> {
         let n = self.positions.len();
-        let mut first = vec![0u32; n + 2];
+        let mut first = vec![0u32; n + 1];
         for (f, face) in (0u32..).zip(&self.faces) {
             if let Some(&vertex) = face.iter().find(|&&v| v as usize >= n) {
                 return Err(Defect::MissingVertex { face: f, vertex });
             }
-            if face[0] == face[1] || face[1] == face[2] || face[2] == face[0] {
+            let [a, b, c] = *face;
+            if a == b || b == c || c == a {
                 return Err(Defect::RepeatedCorner { face: f });
             }
-            for &v in face {
-                first[v as usize + 2] += 1;
+            for lowest in [a.min(b), b.min(c), c.min(a)] {
+                first[lowest as usize + 1] += 1;
             }
         }
-        for v in 0..=n {
+        for v in 0..n {
             first[v + 1] += first[v];
         }
-        let mut leaving = vec![Leaving { half: 0, to: 0 }; 3 * self.faces.len()];
-        for (f, &[a, b, c]) in (0u32..).zip(&self.faces) {
-            for (half, from, to) in [(3 * f, a, b), (3 * f + 1, b, c), (3 * f + 2, c, a)] {
-                let row = &mut first[from as usize + 1];
-                leaving[*row as usize] = Leaving { half, to };
-                *row += 1;
-            }
-        }
-        first.truncate(n + 1);
-        Ok((first, leaving))
+        Ok(first)
     }
 
     /// Checks that every vertex has exactly one fan of faces; `opposite` from [`Self::opposites`].
@@ -196,11 +192,13 @@ impl TriangleMesh {
     }
 }
 
-/// A half-edge with the vertex that it reaches.
+/// An edge with what has been met of it, kept with its lower end.
 #[derive(Clone, Copy, Debug)]
-struct Leaving {
-    half: u32,
-    to: u32,
+struct Met {
+    /// Its higher end.
+    other: u32,
+    /// The half-edges up and down, [`BORDER`] where none was met.
+    halves: [u32; 2],
 }
 
 /// Faces met going counter-clockwise about the origin of `start` until the border or `start`.
