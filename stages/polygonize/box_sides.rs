@@ -62,10 +62,14 @@ pub(crate) fn no_crossing_on_sides(
     crossings: &[[u32; 2]],
 ) -> Result<(), PolygonizeError> {
     let grid = &complex.grid;
+    let flat = |side: &Side| if side.upper { grid.end(side.axis) } else { 0 };
+    let sides: Vec<(Side, u32)> = sides()
+        .filter(|side| is_model_side(ctx, grid, *side))
+        .map(|side| (side, flat(&side)))
+        .collect();
     for &[a, b] in crossings {
         let (at_a, at_b) = (complex.site(a), complex.site(b));
-        for side in sides().filter(|side| is_model_side(ctx, grid, *side)) {
-            let flat = if side.upper { grid.end(side.axis) } else { 0 };
+        for &(side, flat) in &sides {
             if at_a[side.axis] == flat && at_b[side.axis] == flat {
                 let at = 0.5 * (complex.point(a) + complex.point(b));
                 return Err(PolygonizeError::LeavesBox { side, at });

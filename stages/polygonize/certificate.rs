@@ -10,12 +10,14 @@
 //! square of the box; where they know nothing plain enclosures may still tell. A box that fails is
 //! halved along the axis that adds most to the doubt, within a budget. What still fails is refined.
 //! The crate's page proves what follows when all pass.
+#![expect(clippy::inline_always, reason = "kernels must be compiled for the widest vectors whole")]
 
 use crate::complex::{Complex, Tetrahedron};
-use crate::interpolant::Interpolant;
+use crate::hopeless::hopeless;
+use crate::interpolant::{Frame, LANES, Octet};
 use crate::transversal::BoxForms;
 use isospline_geometry::Vec3;
-use isospline_implicit::{Affine, AffineJet, Field, Interval, IntervalJet, Jet1};
+use isospline_implicit::{Affine, AffineJet, Field, Interval, IntervalJet, Kernel, run_widest};
 
 /// Boxes that one cube may take. Expanded polynomials of high degree (the double torus, the chair)
 /// need a few hundred where their gradient is small; more only delays refinement where it is due.
@@ -23,9 +25,6 @@ use isospline_implicit::{Affine, AffineJet, Field, Interval, IntervalJet, Jet1};
 const MOST_BOXES: u32 = 800;
 /// Halvings of a cube, over all axes, after which a box counts as failed.
 const MOST_HALVINGS: u32 = 15;
-/// Tetrahedra that turn from the gradient so far that their cosine is below this, at points of
-/// their own piece, are refined without asking for a proof: it would take many boxes.
-const HOPELESS_COSINE: f64 = 0.25;
 /// Boxes that are looked at together at least, if there are as many: what the field encloses at
 /// a time.
 const LEAST_BATCH: usize = 64;
@@ -51,32 +50,35 @@ pub(crate) fn failing(
     complex: &Complex,
     cubes: &[Cube],
 ) -> Vec<(usize, Tetrahedron)> {
-    // One word holds the set of open tetrahedra; a cube has 24 of one kind at most.
-    let shares = cubes
-        .iter()
-        .enumerate()
-        .flat_map(|(k, cube)| cube.tetrahedra.chunks(64).map(move |t| (k, cube.domain, t)));
-    let (owners, mut tests): (Vec<usize>, Vec<Test<'_>>) =
-        shares.map(|(k, domain, t)| (k, Test::new(field, complex, domain, t))).unzip();
-    let mut jets = Jets::default();
-    loop {
-        let batch = next_batch(&mut tests);
-        if batch.is_empty() {
-            break;
-        }
-        look(field, &mut tests, batch, &mut jets);
+    let mut search = Search::new(field, complex, cubes);
+    while !search.batch.is_empty() {
+        search.look();
+        search.take_batch();
     }
-    let failed_of = |(owner, test): (usize, &Test<'_>)| {
-        let tetrahedra = test.tetrahedra.to_vec();
-        members(test.failed).map(move |i| (owner, tetrahedra[i]))
+    let failed_of = |test: &Test<'_>| {
+        let (cube, tetrahedra) = (test.cube, test.tetrahedra.to_vec());
+        members(test.failed).map(move |i| (cube, tetrahedra[i]))
     };
-    owners.into_iter().zip(&tests).flat_map(failed_of).collect()
+    search.tests.iter().flat_map(failed_of).collect()
+}
+
+/// The tests of all cubes, and the boxes that are looked at next.
+struct Search<'a> {
+    field: &'a dyn Field,
+    tests: Vec<Test<'a>>,
+    /// Of the tetrahedra of all tests; those of each begin with an octet of their own.
+    octets: Vec<Octet>,
+    batch: Vec<Entry>,
+    domains: Vec<[Interval; 3]>,
+    forms: Vec<Option<AffineJet>>,
 }
 
 /// The test of some tetrahedra of one cube.
 struct Test<'a> {
+    /// Place of the cube.
+    cube: usize,
     tetrahedra: &'a [Tetrahedron],
-    interpolants: Vec<Interpolant>,
+    first_octet: usize,
     /// Those found to fail.
     failed: u64,
     /// Boxes to look at, the next one last.
@@ -89,105 +91,207 @@ struct Test<'a> {
 #[derive(Clone, Copy)]
 struct Part {
     domain: [Interval; 3],
-    middle: Vec3,
-    /// Half its size; covers the rounding of the middle.
-    radius: Vec3,
+    /// Half its size covers the rounding of the middle.
+    frame: Frame,
     /// The tetrahedra that have not passed on all of the box.
     open: u64,
     /// How often the cube was halved.
     halvings: u32,
 }
 
-/// What the field answers about a batch; kept to spare allocations.
-#[derive(Default)]
-struct Jets {
-    domains: Vec<[Interval; 3]>,
-    forms: Vec<Option<AffineJet>>,
+/// A box with its test.
+struct Entry {
+    test: usize,
+    part: Part,
+    /// How much each axis adds to the doubt about the tetrahedra that are open; `None` where forms
+    /// know nothing.
+    spreads: Option<Vec3>,
 }
 
-/// A part with its test.
-type Entry = (usize, Part);
-
-/// The next boxes of all tests: one of each, or some if few tests are left.
-fn next_batch(tests: &mut [Test<'_>]) -> Vec<Entry> {
-    let active = tests.iter().filter(|test| !test.parts.is_empty()).count();
-    let each = LEAST_BATCH.div_ceil(active.max(1));
-    let mut batch = Vec::with_capacity(active * each);
-    for (i, test) in tests.iter_mut().enumerate() {
-        let rest = test.parts.len().saturating_sub(each);
-        batch.extend(test.parts.drain(rest..).rev().map(|part| (i, part)));
+impl Entry {
+    fn new(test: usize, part: Part) -> Self {
+        Self { test, part, spreads: None }
     }
-    batch
 }
 
-/// Looks at boxes; what fails is halved and put back.
-fn look(field: &dyn Field, tests: &mut [Test<'_>], mut batch: Vec<Entry>, jets: &mut Jets) {
-    batch.retain_mut(|(i, part)| tests[*i].admits(part));
-    jets.domains.clear();
-    jets.domains.extend(batch.iter().map(|(_, part)| part.domain));
-    jets.forms.clear();
-    jets.forms.resize(batch.len(), None);
-    field.gradient_forms(&jets.domains, &mut jets.forms);
-    let mut unknown = Vec::new();
-    for ((i, mut part), jet) in batch.into_iter().zip(&jets.forms).rev() {
-        let forms = jet.as_ref().and_then(|jet| BoxForms::new(jet, part.middle, part.radius));
-        let Some(forms) = forms else {
-            unknown.push((i, part));
-            continue;
-        };
-        let spreads = tests[i].look(&mut part, &forms);
-        if part.open != 0 {
-            let axis = part.loosest_axis(spreads);
-            tests[i].halve(&part, axis);
+impl<'a> Search<'a> {
+    fn new(field: &'a dyn Field, complex: &Complex, cubes: &'a [Cube]) -> Self {
+        // One word holds the set of open tetrahedra; a cube has 24 of one kind at most.
+        let shares = cubes
+            .iter()
+            .enumerate()
+            .flat_map(|(k, cube)| cube.tetrahedra.chunks(64).map(move |t| (k, t)));
+        let mut octets = Vec::with_capacity(cubes.len());
+        let mut tests = Vec::with_capacity(cubes.len());
+        for (cube, tetrahedra) in shares {
+            let (first_octet, parts) = (octets.len(), Vec::new());
+            octets.resize(first_octet + tetrahedra.len().div_ceil(LANES), Octet::EMPTY);
+            run_widest(Fill { complex, tetrahedra, octets: &mut octets[first_octet..] });
+            tests.push(Test { cube, tetrahedra, first_octet, failed: 0, parts, boxes: MOST_BOXES });
+        }
+        let groups = tests.iter().map(|test| (test.tetrahedra, &octets[test.first_octet..]));
+        let failed = hopeless(field, groups);
+        let mut batch = Vec::with_capacity(tests.len().max(LEAST_BATCH));
+        for (k, (test, failed)) in tests.iter_mut().zip(failed).enumerate() {
+            test.failed = failed;
+            let all = u64::MAX >> (64 - test.tetrahedra.len());
+            batch.push(Entry::new(k, Part::new(cubes[test.cube].domain, all, 0)));
+        }
+        Self { field, tests, octets, batch, domains: Vec::new(), forms: Vec::new() }
+    }
+
+    /// The next boxes of all tests: one of each, or some if few tests are left.
+    fn take_batch(&mut self) {
+        let active = self.tests.iter().filter(|test| !test.parts.is_empty()).count();
+        let each = LEAST_BATCH.div_ceil(active.max(1));
+        self.batch.clear();
+        for (k, test) in self.tests.iter_mut().enumerate() {
+            let rest = test.parts.len().saturating_sub(each);
+            self.batch.extend(test.parts.drain(rest..).rev().map(|part| Entry::new(k, part)));
         }
     }
-    unknown.reverse();
-    look_plainly(field, tests, unknown);
-}
 
-/// Looks at boxes over which forms know nothing, by plain enclosures: those of products with zero
-/// are known whatever the other factor is.
-fn look_plainly(field: &dyn Field, tests: &mut [Test<'_>], batch: Vec<Entry>) {
-    if batch.is_empty() {
-        return;
+    /// Looks at the batch; what fails is halved and put back.
+    fn look(&mut self) {
+        let Self { field, tests, octets, batch, domains, forms } = self;
+        run_widest(LeaveBeside { tests, octets, batch });
+        batch.retain_mut(|entry| tests[entry.test].admits(&mut entry.part));
+        domains.clear();
+        domains.extend(batch.iter().map(|entry| entry.part.domain));
+        forms.clear();
+        forms.resize(batch.len(), None);
+        field.gradient_forms(domains, forms);
+        run_widest(LookClosely { tests, octets, batch, forms });
+        let mut unknown = Vec::new();
+        for entry in batch.iter().rev() {
+            let Some(spreads) = entry.spreads else {
+                unknown.push((entry.test, entry.part));
+                continue;
+            };
+            if entry.part.open != 0 {
+                tests[entry.test].halve(&entry.part, entry.part.loosest_axis(spreads));
+            }
+        }
+        unknown.reverse();
+        self.look_plainly(unknown);
     }
-    let domains: Vec<_> = batch.iter().map(|(_, part)| part.domain).collect();
-    let mut jets = vec![None; domains.len()];
-    field.gradient_enclosures(&domains, &mut jets);
-    for ((i, mut part), jet) in batch.into_iter().zip(jets).rev() {
-        let Some(IntervalJet { value, gradient }) = jet else {
-            tests[i].failed |= part.open;
-            continue;
-        };
-        part.keep(&tests[i], |l, part| {
-            !l.is_transversal(&gradient) && !l.has_sign_of(value, part.middle, part.radius)
-        });
-        if part.open != 0 {
-            let axis = part.loosest_axis(part.radius);
-            tests[i].halve(&part, axis);
+
+    /// Looks at boxes over which forms know nothing, by plain enclosures: those of products with zero
+    /// are known whatever the other factor is.
+    fn look_plainly(&mut self, batch: Vec<(usize, Part)>) {
+        if batch.is_empty() {
+            return;
+        }
+        let domains: Vec<_> = batch.iter().map(|(_, part)| part.domain).collect();
+        let mut jets = vec![None; domains.len()];
+        self.field.gradient_enclosures(&domains, &mut jets);
+        for ((k, mut part), jet) in batch.into_iter().zip(jets).rev() {
+            let test = &mut self.tests[k];
+            let Some(IntervalJet { value, gradient }) = jet else {
+                test.failed |= part.open;
+                continue;
+            };
+            let octets = &self.octets[test.first_octet..];
+            let is_open = |&l: &usize| {
+                let (octet, i) = (&octets[l / LANES], l % LANES);
+                !octet.is_transversal(i, &gradient) && !octet.has_sign_of(i, value, &part.frame)
+            };
+            part.open = set(members(part.open).filter(is_open));
+            if part.open != 0 {
+                test.halve(&part, part.loosest_axis(Vec3::from(part.frame[1])));
+            }
         }
     }
 }
 
-impl<'a> Test<'a> {
-    fn new(
-        field: &dyn Field,
-        complex: &Complex,
-        cube: [Interval; 3],
-        tetrahedra: &'a [Tetrahedron],
-    ) -> Self {
-        let interpolants: Vec<_> = tetrahedra.iter().map(|t| Interpolant::of(complex, t)).collect();
-        let failed = hopeless(field, &interpolants);
-        let open = set(0..interpolants.len()) & !failed;
-        let mut parts = Vec::with_capacity(USUAL_PARTS);
-        parts.push(Part::new(cube, open, 0));
-        Self { tetrahedra, interpolants, failed, parts, boxes: MOST_BOXES }
-    }
+/// Fills the octets of some tetrahedra.
+struct Fill<'a> {
+    complex: &'a Complex,
+    tetrahedra: &'a [Tetrahedron],
+    octets: &'a mut [Octet],
+}
 
+impl Kernel for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (octet, tetrahedra) in self.octets.iter_mut().zip(self.tetrahedra.chunks(LANES)) {
+            octet.fill(self.complex, tetrahedra);
+        }
+    }
+}
+
+/// Closes tetrahedra in boxes that do not meet them.
+struct LeaveBeside<'a> {
+    tests: &'a [Test<'a>],
+    octets: &'a [Octet],
+    batch: &'a mut [Entry],
+}
+
+impl Kernel for LeaveBeside<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // All tetrahedra of a cube meet the whole of it.
+        for entry in self.batch.iter_mut().filter(|entry| entry.part.halvings > 0) {
+            let first = self.tests[entry.test].first_octet;
+            let part = &mut entry.part;
+            for k in occupied(part.open) {
+                part.open &= !(self.octets[first + k].beside(&part.frame) << (LANES * k));
+            }
+        }
+    }
+}
+
+/// Closes tetrahedra that pass in boxes, and tells of the others how much each axis adds to the doubt.
+struct LookClosely<'a> {
+    tests: &'a [Test<'a>],
+    octets: &'a [Octet],
+    batch: &'a mut [Entry],
+    forms: &'a [Option<AffineJet>],
+}
+
+impl Kernel for LookClosely<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (entry, jet) in self.batch.iter_mut().zip(self.forms) {
+            let first = self.tests[entry.test].first_octet;
+            let part = &mut entry.part;
+            let Some(jet) = jet else { continue };
+            let Some(forms) = BoxForms::new(jet, &part.frame) else { continue };
+            let (mut open, mut spreads) = (0, Vec3::zeros());
+            for k in occupied(part.open) {
+                let doubts = forms.doubts(&self.octets[first + k]);
+                let left = part.open >> (LANES * k) & doubts.open & OCTET;
+                open |= left << (LANES * k);
+                for i in members(left) {
+                    let [x, y, z] = &doubts.spreads;
+                    spreads += Vec3::new(x[i], y[i], z[i]);
+                }
+            }
+            part.open = open;
+            entry.spreads = Some(spreads);
+        }
+    }
+}
+
+/// The tetrahedra of an octet, as bits.
+const OCTET: u64 = (1 << LANES) - 1;
+
+/// Octets with tetrahedra of a set.
+#[inline(always)]
+fn occupied(set: u64) -> impl Iterator<Item = usize> {
+    (0..64 / LANES).filter(move |k| set >> (LANES * k) & OCTET != 0)
+}
+
+impl Test<'_> {
     /// Whether a box needs a look. If none is left, what is open there fails.
     fn admits(&mut self, part: &mut Part) -> bool {
         part.open &= !self.failed;
-        part.keep(self, |l, part| !l.is_beside(part.middle, part.radius));
         if self.boxes == 0 {
             self.failed |= part.open;
         }
@@ -198,17 +302,6 @@ impl<'a> Test<'a> {
         true
     }
 
-    /// Passes what is proved; how much each axis adds to the doubt about the others.
-    fn look(&self, part: &mut Part, forms: &BoxForms<'_>) -> Vec3 {
-        let mut spreads = Vec3::zeros();
-        part.keep(self, |l, _| {
-            let doubt = forms.doubt(l);
-            spreads += doubt.unwrap_or_else(Vec3::zeros);
-            doubt.is_some()
-        });
-        spreads
-    }
-
     /// Puts the halves of a box back, or takes it for failed.
     fn halve(&mut self, part: &Part, axis: usize) {
         if part.halvings >= MOST_HALVINGS {
@@ -216,9 +309,12 @@ impl<'a> Test<'a> {
             return;
         }
         let (mut lower, mut upper) = (part.domain, part.domain);
-        lower[axis].hi = part.middle[axis];
-        upper[axis].lo = part.middle[axis];
+        lower[axis].hi = part.frame[0][axis];
+        upper[axis].lo = part.frame[0][axis];
         let deeper = part.halvings + 1;
+        if self.parts.capacity() == 0 {
+            self.parts.reserve(USUAL_PARTS);
+        }
         self.parts.extend([upper, lower].map(|half| Part::new(half, part.open, deeper)));
     }
 }
@@ -226,44 +322,26 @@ impl<'a> Test<'a> {
 impl Part {
     fn new(domain: [Interval; 3], open: u64, halvings: u32) -> Self {
         let [x, y, z] = domain.map(Affine::middle_and_half);
-        let (middle, radius) = (Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]));
-        Self { domain, middle, radius, open, halvings }
+        Self { domain, frame: [[x[0], y[0], z[0]], [x[1], y[1], z[1]]], open, halvings }
     }
 
     /// The axis along which the doubt spreads most; the longest where that is not known. A hundredth
     /// keeps long axes in play, since the sign of f needs them too.
     fn loosest_axis(&self, spreads: Vec3) -> usize {
+        let radius = Vec3::from(self.frame[1]);
         let all = spreads.x + spreads.y + spreads.z;
-        let share = 0.01 * all / self.radius.max();
-        let score = if all.is_finite() { spreads + share * self.radius } else { self.radius };
+        let share = 0.01 * all / radius.max();
+        let score = if all.is_finite() { spreads + share * radius } else { radius };
         (0..3).max_by(|&a, &b| score[a].total_cmp(&score[b])).expect("invariant: three axes")
     }
-
-    /// Leaves those open that `is_open`.
-    fn keep(&mut self, test: &Test<'_>, mut is_open: impl FnMut(&Interpolant, &Self) -> bool) {
-        self.open = set(members(self.open).filter(|&l| is_open(&test.interpolants[l], self)));
-    }
 }
 
-/// Those whose own piece is seen to turn too far from the gradient.
-fn hopeless(field: &dyn Field, interpolants: &[Interpolant]) -> u64 {
-    let (mut points, mut owners) = (Vec::new(), Vec::new());
-    for (i, interpolant) in interpolants.iter().enumerate() {
-        points.extend(interpolant.crossings());
-        owners.resize(points.len(), i);
-    }
-    let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
-    field.gradients(&points, &mut jets);
-    set(owners.iter().zip(&jets).filter_map(|(&i, jet)| {
-        let (l, f) = (interpolants[i].gradient, jet.gradient);
-        (l.dot(&f) < HOPELESS_COSINE * l.norm() * f.norm()).then_some(i)
-    }))
-}
-
-fn set(members: impl IntoIterator<Item = usize>) -> u64 {
+/// The set of some places below 64, as bits.
+pub(crate) fn set(members: impl IntoIterator<Item = usize>) -> u64 {
     members.into_iter().fold(0, |set, i| set | 1 << i)
 }
 
+/// The places in a set, ascending.
 fn members(set: u64) -> impl Iterator<Item = usize> {
     let mut rest = set;
     std::iter::from_fn(move || {

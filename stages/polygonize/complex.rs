@@ -8,7 +8,7 @@
 
 use crate::PolygonizeError;
 use crate::bulk;
-use crate::grid::{Grid, Site, pack, unpack};
+use crate::grid::{Grid, Planes, Site, pack, unpack};
 use crate::key_map::{KeyMap, pair};
 use isospline_geometry::Vec3;
 use isospline_implicit::Interval;
@@ -45,6 +45,7 @@ struct Leaf {
 pub(crate) struct Complex {
     /// The grid of the cells.
     pub(crate) grid: Grid,
+    planes: Planes,
     cells: Vec<Cell>,
     /// Tetrahedra of the refined cells, which are few.
     refined: Vec<Vec<Leaf>>,
@@ -65,6 +66,7 @@ impl Complex {
     /// [`PolygonizeError::NotANumber`] if the field has no value at a node.
     pub(crate) fn new(ctx: &Ctx<'_>, grid: Grid, cells: &[Site]) -> Result<Self, PolygonizeError> {
         let mut complex = Self {
+            planes: Planes::of(&grid),
             grid,
             cells: Vec::with_capacity(cells.len()),
             refined: Vec::new(),
@@ -152,7 +154,7 @@ impl Complex {
 
     /// Position of a node.
     pub(crate) fn point(&self, node: u32) -> Vec3 {
-        self.grid.point(self.site(node))
+        self.planes.point(&self.grid, self.site(node))
     }
 
     /// Field value at a node.
@@ -317,7 +319,8 @@ impl Complex {
     fn evaluate(&mut self, ctx: &Ctx<'_>) -> Result<(), PolygonizeError> {
         let new = &self.sites[self.values.len()..];
         let found = bulk::shares(ctx.host, new, |sites| {
-            let points: Vec<_> = sites.iter().map(|&s| self.grid.point(unpack(s))).collect();
+            let points: Vec<_> =
+                sites.iter().map(|&s| self.planes.point(&self.grid, unpack(s))).collect();
             bulk::values(ctx.field, &points)
         });
         if let Some(i) = found.iter().position(|f| f.is_nan()) {

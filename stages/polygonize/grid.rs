@@ -90,6 +90,32 @@ impl Grid {
     }
 }
 
+/// The coordinates of the planes of a lattice: looked up, since those of a point take divisions.
+#[derive(Clone, Debug)]
+pub(crate) struct Planes([Vec<f64>; 3]);
+
+impl Planes {
+    /// Planes from which on they would take too much memory.
+    const MOST: u32 = 1 << 17;
+
+    /// All, or none where they are too many.
+    pub(crate) fn of(grid: &Grid) -> Self {
+        let fits = grid.longest() << grid.levels < Self::MOST;
+        let planes = |axis: usize| (0..=grid.end(axis)).map(move |at| grid.coordinate(axis, at));
+        Self([0, 1, 2].map(|axis| if fits { planes(axis).collect() } else { Vec::new() }))
+    }
+
+    /// [`Grid::point`], the same bits.
+    #[inline]
+    pub(crate) fn point(&self, grid: &Grid, at: Site) -> Vec3 {
+        let [x, y, z] = &self.0;
+        match (x.get(at[0] as usize), y.get(at[1] as usize), z.get(at[2] as usize)) {
+            (Some(&x), Some(&y), Some(&z)) => Vec3::new(x, y, z),
+            _ => grid.point(at),
+        }
+    }
+}
+
 /// Packs a lattice point.
 pub(crate) fn pack(at: Site) -> u64 {
     u64::from(at[0]) | u64::from(at[1]) << SITE_BITS | u64::from(at[2]) << (2 * SITE_BITS)

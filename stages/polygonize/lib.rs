@@ -53,6 +53,7 @@ mod complex;
 mod crossing;
 pub mod error;
 mod grid;
+mod hopeless;
 mod interpolant;
 mod key_map;
 mod lost_parts;
@@ -80,6 +81,7 @@ use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
 use marching::Pieces;
 use proof::Beside;
 use resolution::Survey;
+use std::sync::OnceLock;
 
 /// Triangles made at least for each face wanted: decimation only takes away.
 const LEAST_OF_FACES: f64 = 1.05;
@@ -125,12 +127,37 @@ impl Stage for Polygonize {
     ) -> Result<Piece<Mesh>, PolygonizeError> {
         let mut counters = Counters::default();
         let (mesh, proof) = polygonize(ctx, &self.params, &mut counters)?;
-        sharp_edges::none_on(ctx, &mesh)?;
-        let mesh = small_parts::without(mesh, self.params.drop_below, &mut counters);
-        let rows = Mesh::from_triangles(&mesh, proof)
-            .expect("invariant: merging keeps a manifold manifold");
+        let rows = self.rows(ctx, &mesh, proof, &mut counters)?;
         counters.count("triangles", rows.face.len() as u64);
         Ok(Piece { rows, counters })
+    }
+}
+
+impl Polygonize {
+    /// The rows of a mesh without sharp edges, which are looked for beside making them.
+    fn rows(
+        &self,
+        ctx: &Ctx<'_>,
+        mesh: &TriangleMesh,
+        proof: TopologyProof,
+        counters: &mut Counters,
+    ) -> Result<Mesh, PolygonizeError> {
+        let looked = OnceLock::new();
+        let made = OnceLock::new();
+        ctx.host.for_each(2, &|i| match i {
+            0 => drop(looked.set(sharp_edges::none_on(ctx, mesh))),
+            _ => drop(made.set({
+                let mut counters = Counters::default();
+                let kept = small_parts::without(mesh, self.params.drop_below, &mut counters);
+                let rows = Mesh::from_triangles(kept.as_ref().unwrap_or(mesh), proof)
+                    .expect("invariant: merging keeps a manifold manifold");
+                (rows, counters)
+            })),
+        });
+        looked.into_inner().expect("invariant: part 0 ran")?;
+        let (rows, found) = made.into_inner().expect("invariant: part 1 ran");
+        counters.merge(&found);
+        Ok(rows)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::grid::Site;
 use crate::params::PolygonizeParams;
 use crate::{PolygonizeError, singular};
 use isospline_geometry::{Aabb, Vec3};
-use isospline_stage::{Counters, Ctx, Serial, map};
+use isospline_stage::{Counters, Ctx, map};
 use std::sync::OnceLock;
 
 /// Cells a task.
@@ -70,11 +70,11 @@ pub(crate) fn prove_beside<T: Send + Sync>(
     let (bent, rest) = by_bend(complex);
     let first = failing_cells(ctx, complex, &bent);
     let guess = || {
-        let (ctx, mut complex) = (Ctx { host: &Serial, ..*ctx }, complex.clone());
+        let mut complex = complex.clone();
         let mut counters = Counters::default();
         let failed = (tetrahedra(first.clone()), GUESSED);
-        let failed = refine_failing(&ctx, &mut complex, params, failed, &mut counters)?;
-        Ok(failed.is_empty().then(|| (work(&ctx, complex), counters)))
+        let failed = refine_failing(ctx, &mut complex, params, failed, &mut counters)?;
+        Ok(failed.is_empty().then(|| (work(ctx, complex), counters)))
     };
     let tasks: Vec<&[u32]> = rest.chunks(CELLS_A_TASK).collect();
     let guessed = OnceLock::new();

@@ -27,7 +27,7 @@ pub(crate) fn merge(ctx: &Ctx<'_>, mesh: TriangleMesh, sides: Vec<f64>) -> Trian
     let (mesh, sides) =
         if mesh.faces.len() > TILE { merge_tiles(ctx, mesh, &sides) } else { (mesh, sides) };
     let normals = normals(ctx, &mesh.positions);
-    let mut edit = EditMesh::new(mesh).expect("invariant: marching tetrahedra make a manifold");
+    let mut edit = EditMesh::part(mesh).expect("invariant: marching tetrahedra make a manifold");
     merge_all(&mut edit, &normals, &sides, &[]);
     edit.compact()
 }
@@ -97,7 +97,11 @@ fn merge_all(edit: &mut EditMesh, normals: &[Vec3], sides: &[f64], kept: &[bool]
             if ![a, b].iter().any(|&v| before[v as usize] || changed[v as usize]) {
                 continue;
             }
-            if is_kept(a) || is_kept(b) || !is_short(edit, sides, a, b) || !edit.can_collapse(h) {
+            if is_kept(a)
+                || is_kept(b)
+                || !is_short(distance(edit, a, b), sides, a, b)
+                || !edit.can_collapse(h)
+            {
                 continue;
             }
             let o = edit.opposite(h).expect("invariant: the mesh is closed");
@@ -133,9 +137,12 @@ fn normals(ctx: &Ctx<'_>, points: &[Vec3]) -> Vec<Vec3> {
 fn short_edges(edit: &EditMesh, sides: &[f64]) -> Vec<(f64, HalfEdge)> {
     let length = |h: HalfEdge| {
         let (a, b) = (edit.origin(h), edit.target(h));
-        is_short(edit, sides, a, b).then(|| (distance(edit, a, b), h))
+        let length = distance(edit, a, b);
+        is_short(length, sides, a, b).then_some((length, h))
     };
-    let mut edges: Vec<_> = edit.edges().filter_map(length).collect();
+    let all = edit.edge_list(0..edit.face_rows());
+    let mut edges = Vec::with_capacity(all.len());
+    edges.extend(all.into_iter().filter_map(length));
     edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     edges
 }
@@ -144,8 +151,8 @@ fn distance(edit: &EditMesh, a: u32, b: u32) -> f64 {
     (edit.positions[a as usize] - edit.positions[b as usize]).norm()
 }
 
-fn is_short(edit: &EditMesh, sides: &[f64], a: u32, b: u32) -> bool {
-    distance(edit, a, b) < SHORT * sides[a as usize].min(sides[b as usize])
+fn is_short(length: f64, sides: &[f64], a: u32, b: u32) -> bool {
+    length < SHORT * sides[a as usize].min(sides[b as usize])
 }
 
 /// Whether the faces of `from` that remain keep their direction and shape with it moved to `to`.

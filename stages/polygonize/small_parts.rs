@@ -3,15 +3,15 @@
 use isospline_geometry::{Aabb, TriangleMesh};
 use isospline_stage::Counters;
 
-/// The mesh without components whose box has a diagonal below `drop_below` times that of all;
-/// counts them.
+/// The mesh without components whose box has a diagonal below `drop_below` times that of all, if
+/// there are any; counts them.
 pub(crate) fn without(
-    mesh: TriangleMesh,
+    mesh: &TriangleMesh,
     drop_below: f64,
     counters: &mut Counters,
-) -> TriangleMesh {
+) -> Option<TriangleMesh> {
     if drop_below <= 0.0 {
-        return mesh;
+        return None;
     }
     let opposite = mesh.opposites().expect("invariant: the mesh is a manifold");
     let of_face = mesh.face_components(&opposite);
@@ -28,13 +28,13 @@ pub(crate) fn without(
     let is_small: Vec<bool> = boxes.iter().map(|part| part.diagonal() < least).collect();
     let n_small = is_small.iter().filter(|&&small| small).count();
     if n_small == 0 {
-        return mesh;
+        return None;
     }
     counters.count("dropped_components", n_small as u64);
     let faces = mesh.faces.iter().zip(&of_face);
     let kept =
         faces.filter(|&(_, &part)| !is_small[part as usize]).map(|(&face, _)| face).collect();
-    compacted(&mesh, kept)
+    Some(compacted(mesh, kept))
 }
 
 /// The mesh of these faces, with their vertices alone, in the order they had.
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn small_components_are_left_out_and_counted() {
         let mut counters = Counters::default();
-        let left = without(tetrahedra(&[0.1, 1.0, 0.02]), 0.05, &mut counters);
+        let left = without(&tetrahedra(&[0.1, 1.0, 0.02]), 0.05, &mut counters).unwrap();
         assert_eq!(left, tetrahedra(&[0.1, 1.0]));
         assert_eq!(counters.counts.get("dropped_components"), Some(&1));
     }
@@ -82,6 +82,6 @@ mod tests {
     #[test]
     fn zero_keeps_all() {
         let mesh = tetrahedra(&[1.0, 1e-9]);
-        assert_eq!(without(mesh.clone(), 0.0, &mut Counters::default()), mesh);
+        assert_eq!(without(&mesh, 0.0, &mut Counters::default()), None);
     }
 }
