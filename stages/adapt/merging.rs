@@ -12,8 +12,8 @@ use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
 /// Candidates judged in a task, of some ten curves each.
-const CANDIDATES_A_TASK: usize = 32;
-/// Candidates judged together at least: two tasks.
+const CANDIDATES_A_TASK: usize = 16;
+/// Candidates judged together at least: some tasks for each thread.
 const FEWEST_JUDGED: usize = 64;
 
 /// Merges up to `n_wanted` edges whose new curves stay below `limit`; best first.
@@ -143,7 +143,12 @@ fn fan<'s>(
     (h, merged): &'s (HalfEdge, Vertex),
 ) -> Vec<JudgedEdge<'s>> {
     let spoke = |v: u32| JudgedEdge { ends: [merged, surface.at(v)], wings: None };
-    ring(surface, *h).map(spoke).collect()
+    // A wing comes twice, and its curve need not be judged twice.
+    let end = surface.mesh.origin(*h);
+    let second = surface.mesh.valence(end) - 1;
+    let wings = surface.wings(*h).unwrap_or([end; 2]);
+    let places = ring(surface, *h).enumerate();
+    places.filter(|(k, v)| *k < second || !wings.contains(v)).map(|(_, v)| spoke(v)).collect()
 }
 
 fn take_longest<'s>(fan: &mut Vec<JudgedEdge<'s>>) -> JudgedEdge<'s> {
