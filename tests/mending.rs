@@ -68,6 +68,26 @@ fn a_shorter_search_after_a_longer_one_ends_as_it_would_have_alone() {
 }
 
 #[test]
+fn beside_planes_and_cylinders_folds_go_without_a_larger_error() {
+    let sandbox = Sandbox::new();
+    let formula = "smax(x^2 + y^2 - 0.5, z^2 - 0.6, 0.3)";
+    let run = |more: &[&str]| {
+        let args = ["run", "--formula", formula, "--out", "out", "--no-sync"];
+        let sets = ["--set", "target.faces=1000", "--set", "target.fit=fast"];
+        sandbox.isospline(&[&args, &sets, more].concat()).code
+    };
+    assert_eq!(run(&["--set", "target.mends=0"]), 1);
+    let folded = sandbox.checked();
+    assert!(folded["flipped_patches"].as_u64().unwrap() > 0);
+    assert_eq!(run(&[]), 0);
+    let report = sandbox.checked();
+    assert_eq!((&report["flipped_patches"], &report["pass"]), (&0.into(), &true.into()));
+    assert!(report["repairs"]["network.curves_of_the_paper"].as_u64().unwrap() > 0);
+    let error = |report: &serde_json::Value| report["rel_error_max"].as_f64().unwrap();
+    assert!(error(&report) <= 1.2 * error(&folded), "{} {}", error(&report), error(&folded));
+}
+
+#[test]
 fn a_given_mesh_with_a_corner_of_two_degrees_is_kept_and_does_not_fold() {
     let sandbox = Sandbox::new();
     let mesh = root().join("tests/fixtures/meshes/torus_600.obj").display().to_string();

@@ -70,6 +70,15 @@ pub(crate) fn measure(surface: &Surface<'_>, field: &dyn Field, for_each: ForEac
     out
 }
 
+/// A face whose patch will not do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnfitFace {
+    /// The face.
+    pub face: u32,
+    /// Whether its patch faces inward at a sample; if not it is too far from the surface.
+    pub folds: bool,
+}
+
 /// The faces whose patch faces inward at a sample, or is farther from the surface than `limit`,
 /// in model units.
 pub fn unfit_faces(
@@ -77,10 +86,11 @@ pub fn unfit_faces(
     field: &dyn Field,
     limit: f64,
     for_each: ForEach<'_>,
-) -> Vec<u32> {
+) -> Vec<UnfitFace> {
     let faces = measure(surface, field, for_each).faces;
     let is_unfit = |figures: &FaceFigures| figures.flipped || figures.max > limit;
-    (0..).zip(faces).filter(|(_, figures)| is_unfit(figures)).map(|(face, _)| face).collect()
+    let unfit = (0..).zip(faces).filter(|(_, figures)| is_unfit(figures));
+    unfit.map(|(face, figures)| UnfitFace { face, folds: figures.flipped }).collect()
 }
 
 /// The place of `stencil` on face `f`.

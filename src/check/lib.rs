@@ -28,7 +28,7 @@ mod box_spline;
 mod seeded_defects;
 
 pub use checker::{Job, check};
-pub use distance::unfit_faces;
+pub use distance::{UnfitFace, unfit_faces};
 pub use lent_threads::{ForEach, on_this_thread};
 pub use params::{CheckParams, Expected};
 pub use report::{CheckReport, Component, EdgeDefects, Place};

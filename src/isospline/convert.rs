@@ -3,7 +3,7 @@
 use crate::config::DEFAULT_MENDS;
 use crate::config::{ConfigError, Inside, StageParams};
 use crate::folder::{CURVES_COUNTER, refused, relax_goal, up_to_curves};
-use crate::mending::{Mending, Place, applies, unfit_places};
+use crate::mending::{Mending, Unfit, applies, unfit};
 use crate::model::{given_mesh, oriented};
 use crate::stages;
 use crate::tolerance::{Found, Round, Step, next};
@@ -215,14 +215,14 @@ impl<'f> ConvertJob<'_, 'f> {
             return Ok(best);
         }
         let mut mending = Mending::default();
-        mending.add(best.unfit_places(self.options.run.threads)?);
+        mending.add(best.unfit(self.options.run.threads)?);
         while !mending.is_over(self.options.mends, faces) {
             let mut params = params.clone();
-            params.adapt.splits.extend_from_slice(mending.tried());
-            let n_before = mending.tried().len();
+            mending.tried().put_into(&mut params);
+            let n_before = mending.n_tried();
             let made = self.whole(&params)?;
-            mending.add(made.unfit_places(self.options.run.threads)?);
-            if mending.kept().len() == n_before {
+            mending.add(made.unfit(self.options.run.threads)?);
+            if mending.n_kept() == n_before {
                 best = made;
             }
         }
@@ -300,9 +300,9 @@ impl Conversion<'_> {
         Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
     }
 
-    fn unfit_places(&self, threads: usize) -> Result<Vec<Place>, ConvertError> {
+    fn unfit(&self, threads: usize) -> Result<Vec<Unfit>, ConvertError> {
         let surface = Surface::from_patches(&self.patches()?)?;
-        Ok(unfit_places(&surface, &self.field, self.expected.tolerance, threads))
+        Ok(unfit(&surface, &self.field, self.expected.tolerance, threads))
     }
 
     fn found(&self, tolerance: f64) -> Result<Found, ConvertError> {

@@ -65,9 +65,9 @@ impl ModelFolder {
         let (key, store) = (model.key(), FolderStore::new(path, durability));
         let mut folder = Self { model, key, store, registry, graph };
         if let Ok(faces) = folder.noted_faces()
-            && let Ok(splits) = folder.noted_splits(faces)
+            && let Ok(remedies) = folder.noted_remedies(faces)
         {
-            folder.graph = folder.sized_graph(faces, &splits);
+            folder.graph = folder.sized_graph(faces, remedies);
         }
         folder
     }

@@ -1,6 +1,7 @@
 //! Stage network: a quartic boundary curve for every edge of the base mesh.
 
 mod error;
+mod paper_faces;
 mod params;
 
 pub use error::NetworkError;
@@ -19,6 +20,7 @@ use isospline_geometry::Vec3;
 use isospline_implicit::Jet1;
 use isospline_stage::plan::{Need, cut, ranges};
 use isospline_stage::{Ctx, Piece, Plan, Stage, Task};
+use paper_faces::PaperFaces;
 use std::ops::Range;
 
 /// Fits each edge by itself under the curvature conditions [TK, Eq. (9b)].
@@ -27,6 +29,7 @@ pub struct NetworkStage {
     samples: Samples,
     /// What goes on from the curves of the paper.
     normal: Option<NormalFit>,
+    paper_faces: PaperFaces,
 }
 
 impl Stage for NetworkStage {
@@ -46,7 +49,8 @@ impl Stage for NetworkStage {
         let options =
             NormalOptions { samples: params.normal_samples, iterations: params.iterations };
         let normal = (params.method == Method::Normal).then(|| NormalFit::new(options));
-        Ok(Self { samples: Samples::new(params.samples), normal })
+        let paper_faces = PaperFaces::new(&params.paper_faces);
+        Ok(Self { samples: Samples::new(params.samples), normal, paper_faces })
     }
 
     fn plan(&self, (mesh,): (BaseMeshView<'_>,), rows_per_task: usize) -> Plan {
@@ -69,16 +73,22 @@ impl Stage for NetworkStage {
         let edges = task.writes[0].clone();
         let all: Vec<Ends> = edges.clone().map(|e| ends(&mesh, &curvature, e)).collect();
         let mut curves = self.paper_curves(ctx, &mesh, edges.clone(), &all);
+        let mut piece = Piece::<Network>::default();
         if let Some(fit) = &self.normal {
+            let is_kept = |(k, curve): (usize, &Option<Solution>)| {
+                sound(curve).is_some() && self.paper_faces.are_beside(&mesh, edges.start + k)
+            };
+            let kept: Vec<bool> = curves.iter().enumerate().map(is_kept).collect();
+            let n_kept = kept.iter().filter(|&&kept| kept).count();
+            piece.counters.repair("curves_of_the_paper", n_kept as u64);
             let slants = edges.clone().map(|e| Slant::at_ends(&mesh, e));
             let all: Vec<NormalEdge> = all
                 .into_iter()
                 .zip(slants)
                 .map(|(ends, slants)| NormalEdge { ends, slants })
                 .collect();
-            improve(ctx, fit, &all, &mut curves);
+            improve(ctx, fit, &all, &kept, &mut curves);
         }
-        let mut piece = Piece::<Network>::default();
         for (edge, curve) in edges.clone().zip(curves) {
             record(&mut piece, &curve.ok_or_else(|| no_curve(&mesh, edge))?);
         }
@@ -119,16 +129,28 @@ impl NetworkStage {
     }
 }
 
-/// Replaces curves by ones of less normal distance.
-fn improve(ctx: &Ctx<'_>, fit: &NormalFit, all: &[NormalEdge], curves: &mut [Option<Solution>]) {
-    // A curve from the table of lengths lies too far from any good one to begin with.
-    let sound = |c: &Option<Solution>| c.filter(|c| c.status == CurveStatus::Converged);
-    let starts: Vec<_> = curves.iter().map(|c| sound(c).map(|c| c.inner)).collect();
-    for (curve, better) in curves.iter_mut().zip(fit.fit(ctx.field, all, &starts)) {
+/// Replaces curves by ones of less normal distance, but for those that are `kept`.
+fn improve(
+    ctx: &Ctx<'_>,
+    fit: &NormalFit,
+    all: &[NormalEdge],
+    kept: &[bool],
+    curves: &mut [Option<Solution>],
+) {
+    let open = |k: &usize| !kept[*k];
+    let open: Vec<usize> = (0..all.len()).filter(open).collect();
+    let edges: Vec<NormalEdge> = open.iter().map(|&k| all[k]).collect();
+    let starts: Vec<_> = open.iter().map(|&k| sound(&curves[k]).map(|c| c.inner)).collect();
+    for (k, better) in open.into_iter().zip(fit.fit(ctx.field, &edges, &starts)) {
         if let Some(better) = better {
-            *curve = Some(solution(&better));
+            curves[k] = Some(solution(&better));
         }
     }
+}
+
+/// A curve that is fit to go on from: one from the table of lengths lies too far from any good one.
+fn sound(curve: &Option<Solution>) -> Option<Solution> {
+    curve.filter(|c| c.status == CurveStatus::Converged)
 }
 
 fn solution(curve: &NormalCurve) -> Solution {

@@ -26,11 +26,19 @@ pub struct NetworkParams {
     pub normal_samples: u32,
     /// Evaluations of the field along a curve at most, of each of two starts, 1 to 200, default 40; `normal` only.
     pub iterations: u32,
+    /// Middles of faces, model units, whose sides keep the curves of the paper; `normal` only.
+    pub paper_faces: Vec<[f64; 3]>,
 }
 
 impl Default for NetworkParams {
     fn default() -> Self {
-        Self { method: Method::Normal, samples: 17, normal_samples: 12, iterations: 40 }
+        Self {
+            method: Method::Normal,
+            samples: 17,
+            normal_samples: 12,
+            iterations: 40,
+            paper_faces: Vec::new(),
+        }
     }
 }
 

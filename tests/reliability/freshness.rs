@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 /// Other values of keys whose type does not suggest one.
-const WORDS: [(&str, &[&str]); 10] = [
+const WORDS: [(&str, &[&str]); 11] = [
     ("model.name", &["other"]),
     ("model.formula", &["x^2 + y^2 + z^2 - r - 0.01"]),
     ("model.box", &["[[-1.2, 1.1], [-1.1, 1.1], [-1.1, 1.1]]"]),
@@ -21,6 +21,7 @@ const WORDS: [(&str, &[&str]); 10] = [
     ("adapt.splits", &["[[[0.0, 0.0, 1.0]]]"]),
     ("adapt.vertices", &["free"]),
     ("network.method", &["paper"]),
+    ("network.paper_faces", &["[[0.0, 0.0, 1.0]]"]),
 ];
 
 /// Keys that `configs/reference.toml` has as comments, for they have no default, and one that

@@ -1,10 +1,10 @@
-//! Surfaces with unfit patches, made again with their faces split.
+//! Surfaces with unfit patches, made again with something done about those.
 //!
 //! What was unfit is kept beside the artifacts after each surface: a run that was stopped goes on
 //! where it stopped, and one that ended finds its artifacts fresh.
 
 use super::ModelFolder;
-use crate::mending::{Mending, Place, applies, unfit_places};
+use crate::mending::{Mending, Remedies, Unfit, applies, unfit};
 use isospline_artifact::StoreError;
 use isospline_artifact::kinds::Patches;
 use isospline_check::Surface;
@@ -24,11 +24,11 @@ struct Note {
 }
 
 impl ModelFolder {
-    /// What is split of the base mesh of so many faces, surface after surface.
-    pub(super) fn noted_splits(&self, faces: u32) -> Result<Vec<Vec<Place>>, StoreError> {
+    /// What is done about unfit patches of so many faces.
+    pub(super) fn noted_remedies(&self, faces: u32) -> Result<Remedies, StoreError> {
         let mending = self.noted_mending(faces)?;
         let is_over = mending.is_over(self.model.file.target.mends, faces);
-        Ok(if is_over { mending.kept() } else { mending.tried() }.to_vec())
+        Ok(if is_over { mending.kept() } else { mending.tried() })
     }
 
     /// Runs the whole graph for so many faces, again and again while patches are unfit; the
@@ -40,7 +40,7 @@ impl ModelFolder {
         on_event: &(dyn Fn(&Event) + Sync),
     ) -> Result<RunReport, RunError> {
         if !self.has_mends() {
-            return self.run_graph(&self.sized_graph(faces, &[]), options, on_event);
+            return self.run_graph(&self.sized_graph(faces, Remedies::default()), options, on_event);
         }
         let mut mending = self.noted_mending(faces)?;
         let mut seconds = 0.0;
@@ -52,11 +52,11 @@ impl ModelFolder {
             // What was asked to be made again is made once.
             options.from = None;
             seconds += report.seconds;
-            latest = Some((mending.tried().len(), report));
-            mending.add(self.unfit_places(options.threads)?);
+            latest = Some((mending.n_tried(), report));
+            mending.add(self.unfit(options.threads)?);
             self.note_mending(faces, &mending)?;
         }
-        let latest = latest.filter(|(n_split, _)| *n_split == mending.kept().len());
+        let latest = latest.filter(|(n_before, _)| *n_before == mending.n_kept());
         let Some((_, report)) = latest else {
             let graph = self.sized_graph(faces, mending.kept());
             let report = self.run_graph(&graph, &options, on_event)?;
@@ -70,7 +70,7 @@ impl ModelFolder {
         file.target.mends > 0 && applies(&file.stages, self.model.base_mesh.is_some())
     }
 
-    fn unfit_places(&self, threads: usize) -> Result<Vec<Place>, RunError> {
+    fn unfit(&self, threads: usize) -> Result<Vec<Unfit>, RunError> {
         let container = self.patches()?;
         let patches = container.view::<Patches>()?;
         // Of patches that do not fit together the check tells what is wrong.
@@ -78,7 +78,7 @@ impl ModelFolder {
             |_| Vec::new(),
             |surface| {
                 let tolerance = self.model.file.target.tolerance(surface.diagonal());
-                unfit_places(&surface, &self.model.field, tolerance, threads)
+                unfit(&surface, &self.model.field, tolerance, threads)
             },
         ))
     }

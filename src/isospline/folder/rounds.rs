@@ -7,7 +7,7 @@
 
 use super::{FolderError, ModelFolder};
 use crate::config::ModelFile;
-use crate::mending::Place;
+use crate::mending::Remedies;
 use crate::stages;
 use crate::tolerance::{Found, MOST_REFUSALS, Round, Step, Verdict, next};
 use isospline_artifact::StoreError;
@@ -138,16 +138,16 @@ impl ModelFolder {
         if is_whole {
             return self.run_mended(faces, options, on_event);
         }
-        let mut graph = self.sized_graph(faces, &[]);
+        let mut graph = self.sized_graph(faces, Remedies::default());
         up_to_curves(&mut graph);
         self.run_graph(&graph, options, on_event)
     }
 
-    /// The graph for so many faces of which some are split.
-    pub(super) fn sized_graph(&self, faces: u32, splits: &[Vec<Place>]) -> Graph {
+    /// The graph for so many faces, with what is done about unfit patches.
+    pub(super) fn sized_graph(&self, faces: u32, remedies: Remedies) -> Graph {
         let file = &self.model.file;
         let mut params = file.stages.with_faces(faces);
-        params.adapt.splits.extend_from_slice(splits);
+        remedies.put_into(&mut params);
         // The default, which the user may have written.
         if params.relax.goal <= 0.0 {
             // The box is a little larger than the surface, which does not matter here.
@@ -215,7 +215,7 @@ impl ModelFolder {
     /// All that surfaces, and which of their patches are unfit, depend on but their faces: model,
     /// parameters, versions of the stages, tolerance.
     pub(super) fn surfaces_key(&self) -> String {
-        let graph = self.sized_graph(crate::tolerance::FIRST_FACES, &[]);
+        let graph = self.sized_graph(crate::tolerance::FIRST_FACES, Remedies::default());
         let params: Vec<_> = graph.nodes.iter().map(|node| (&node.stage, &node.params)).collect();
         let versions: Vec<_> = self.registry.stages().map(|s| (s.name, s.version)).collect();
         let target = &self.model.file.target;
