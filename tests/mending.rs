@@ -74,7 +74,7 @@ fn beside_planes_and_cylinders_folds_go_without_a_larger_error() {
     let run = |more: &[&str]| {
         let args = ["run", "--formula", formula, "--out", "out", "--no-sync"];
         let sets = ["--set", "target.faces=1000", "--set", "target.fit=fast"];
-        sandbox.isospline(&[&args, &sets, more].concat()).code
+        sandbox.isospline(&[&args[..], &sets, more].concat()).code
     };
     assert_eq!(run(&["--set", "target.mends=0"]), 1);
     let folded = sandbox.checked();

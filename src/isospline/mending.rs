@@ -57,9 +57,8 @@ impl Remedies {
     fn of(unfit: &[Vec<Unfit>]) -> Self {
         let mut remedies = Self::default();
         for unfit in unfit {
-            let is_new = |face: &&Unfit| {
-                face.by_developable && !remedies.paper_faces.contains(&face.middle)
-            };
+            let is_new =
+                |face: &&Unfit| face.by_developable && !remedies.paper_faces.contains(&face.middle);
             let (new, others): (Vec<&Unfit>, _) = unfit.iter().partition(is_new);
             let middles = |faces: Vec<&Unfit>| faces.into_iter().map(|face| face.middle).collect();
             let (new, others): (Vec<Place>, Vec<Place>) = (middles(new), middles(others));
@@ -151,7 +150,8 @@ pub(crate) fn unfit(
     let found = unfit_faces(surface, field, limit, &|n, body| threads.for_each(n, body));
     let has_developable = !found.is_empty() && has_developable_parts(surface, field);
     let unfit = found.into_iter().map(|found| {
-        let [a, b, c] = surface.faces()[found.face as usize].map(|v| surface.vertices()[v as usize]);
+        let [a, b, c] =
+            surface.faces()[found.face as usize].map(|v| surface.vertices()[v as usize]);
         // As adapt computes it.
         let middle = ((a + b + c) / 3.0).into();
         Unfit { middle, by_developable: found.folds && has_developable }

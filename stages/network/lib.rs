@@ -76,7 +76,7 @@ impl Stage for NetworkStage {
         let mut piece = Piece::<Network>::default();
         if let Some(fit) = &self.normal {
             let is_kept = |(k, curve): (usize, &Option<Solution>)| {
-                sound(curve).is_some() && self.paper_faces.are_beside(&mesh, edges.start + k)
+                sound(*curve).is_some() && self.paper_faces.are_beside(&mesh, edges.start + k)
             };
             let kept: Vec<bool> = curves.iter().enumerate().map(is_kept).collect();
             let n_kept = kept.iter().filter(|&&kept| kept).count();
@@ -140,7 +140,7 @@ fn improve(
     let open = |k: &usize| !kept[*k];
     let open: Vec<usize> = (0..all.len()).filter(open).collect();
     let edges: Vec<NormalEdge> = open.iter().map(|&k| all[k]).collect();
-    let starts: Vec<_> = open.iter().map(|&k| sound(&curves[k]).map(|c| c.inner)).collect();
+    let starts: Vec<_> = open.iter().map(|&k| sound(curves[k]).map(|c| c.inner)).collect();
     for (k, better) in open.into_iter().zip(fit.fit(ctx.field, &edges, &starts)) {
         if let Some(better) = better {
             curves[k] = Some(solution(&better));
@@ -149,7 +149,7 @@ fn improve(
 }
 
 /// A curve that is fit to go on from: one from the table of lengths lies too far from any good one.
-fn sound(curve: &Option<Solution>) -> Option<Solution> {
+fn sound(curve: Option<Solution>) -> Option<Solution> {
     curve.filter(|c| c.status == CurveStatus::Converged)
 }
 

@@ -137,7 +137,7 @@ fn key_schema(table: &str, key: &str) -> Value {
     }
 }
 
-/// The lists that a key takes: three sides of a box, or lists of points.
+/// The lists that a key takes: three sides of a box, points, or lists of points.
 fn list_forms(table: &str, key: &str) -> Vec<Value> {
     let list = |items: Value| json!({ "type": "array", "items": items });
     let fixed = |items: Value, n: usize| {
@@ -152,6 +152,9 @@ fn list_forms(table: &str, key: &str) -> Vec<Value> {
     let sides = [0, 1, 2].map(|k| toml::Value::Array(vec![k.into(), (k + 1).into()]));
     if fits(table, key, sides.to_vec()) {
         forms.push(fixed(fixed(number.clone(), 2), 3));
+    }
+    if fits(table, key, vec![point.clone()]) {
+        forms.push(list(fixed(number.clone(), 3)));
     }
     if fits(table, key, vec![toml::Value::Array(vec![point])]) {
         forms.push(list(list(fixed(number, 3))));

@@ -40,7 +40,11 @@ impl ModelFolder {
         on_event: &(dyn Fn(&Event) + Sync),
     ) -> Result<RunReport, RunError> {
         if !self.has_mends() {
-            return self.run_graph(&self.sized_graph(faces, Remedies::default()), options, on_event);
+            return self.run_graph(
+                &self.sized_graph(faces, Remedies::default()),
+                options,
+                on_event,
+            );
         }
         let mut mending = self.noted_mending(faces)?;
         let mut seconds = 0.0;
