@@ -1,6 +1,7 @@
 //! Curve errors of edges, computed anew only where the mesh has changed.
 
 use crate::curve_error::{JudgedEdge, Measure};
+use crate::known_merges::KnownMerges;
 use crate::surface_mesh::SurfaceMesh;
 use isospline_geometry::HalfEdge;
 use isospline_stage::{Serial, map};
@@ -13,7 +14,8 @@ const FACES_A_TASK: usize = 512;
 /// Diagonals judged in a task.
 const DIAGONALS_A_TASK: usize = 128;
 
-/// Errors of the curves of a mesh's edges and of the diagonals that flips would give.
+/// Errors of the curves of a mesh's edges, of the diagonals that flips would give and of what merging
+/// edges would.
 ///
 /// It follows one mesh through its edits, also back to an earlier state, but not from there to
 /// other edits: how often a vertex has moved tells its places apart only along one history.
@@ -21,6 +23,7 @@ const DIAGONALS_A_TASK: usize = 128;
 pub(crate) struct ErrorCache {
     own: Rows,
     diagonal: Rows,
+    pub(crate) merges: KnownMerges,
 }
 
 impl ErrorCache {

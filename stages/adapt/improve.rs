@@ -56,7 +56,8 @@ pub(crate) fn improve(
         let (limit, n_splits) = split_limit(&errors);
         let excess = surface.mesh.face_count().saturating_sub(n_faces) / 2;
         let wanted = n_splits + excess;
-        let collapsed = collapse_round(surface, &gate, &errors, (COLLAPSE_BELOW * limit, wanted));
+        let limit = COLLAPSE_BELOW * limit;
+        let collapsed = collapse_round(surface, &gate, &errors, (limit, wanted), &mut cache.merges);
         if collapsed > 0 {
             errors = cache.edges(surface);
         }
@@ -99,7 +100,8 @@ pub(crate) fn trim(
             }
             let errors = cache.edges(surface);
             let limit = part * worst(&errors);
-            let collapsed = collapse_round(surface, &gate, &errors, (limit, excess));
+            let collapsed =
+                collapse_round(surface, &gate, &errors, (limit, excess), &mut cache.merges);
             counters.repair("vertices_collapsed_for_count", collapsed);
             if collapsed == 0 {
                 break;

@@ -12,6 +12,7 @@ mod free_vertices;
 pub mod freeze;
 mod gate;
 mod improve;
+mod known_merges;
 mod merging;
 pub mod order;
 mod params;

@@ -4,8 +4,8 @@ use crate::curve_error::JudgedEdge;
 use crate::error_cache::EdgeError;
 use crate::gate::Gate;
 use crate::improve::{ROOM, first_by};
+use crate::known_merges::{KnownMerges, Merge};
 use crate::surface_mesh::SurfaceMesh;
-use crate::vertex::Vertex;
 use isospline_geometry::HalfEdge;
 use isospline_stage::{Serial, map};
 use std::cmp::{Ordering, Reverse};
@@ -13,6 +13,8 @@ use std::collections::BinaryHeap;
 
 /// Candidates judged in a task, of some ten curves each.
 const CANDIDATES_A_TASK: usize = 16;
+/// Edges looked at in a task.
+const EDGES_A_TASK: usize = 64;
 /// Candidates judged together at least: some tasks for each thread.
 const FEWEST_JUDGED: usize = 64;
 
@@ -22,12 +24,17 @@ pub(crate) fn collapse_round(
     gate: &Gate,
     errors: &[EdgeError],
     (limit, n_wanted): (f64, usize),
+    known: &mut KnownMerges,
 ) -> u64 {
-    let candidates = collapse_candidates(surface, gate, errors, (limit, n_wanted));
-    let is_below = |error: f64| error < limit || limit == f64::INFINITY;
+    let time = surface.now();
+    let mut merges = merges_looked_at(surface, gate, errors, (limit, n_wanted), known);
+    judge_longest(surface, &mut merges);
+    let is_below = |rank: &Rank| rank.error < limit || limit == f64::INFINITY;
     // The longest spoke tells of most candidates that they will not do.
-    let mut bounds = judged(surface, &candidates, |fan| vec![take_longest(fan)]);
-    bounds.retain(|rank| is_below(rank.error));
+    let bound =
+        |(candidate, merge): (usize, &Merge)| Some(Rank { error: merge.longest?, candidate });
+    let mut bounds: Vec<Rank> = merges.iter().enumerate().filter_map(bound).collect();
+    bounds.retain(is_below);
     bounds.sort_unstable();
     let mut bounds = bounds.as_slice();
     let mut ranks = BinaryHeap::new();
@@ -36,31 +43,24 @@ pub(crate) fn collapse_round(
     while n_collapsed < n_wanted {
         if bounds.first().is_none_or(|bound| ranks.peek().is_some_and(|Reverse(r)| r < bound)) {
             let Some(Reverse(Rank { candidate, .. })) = ranks.pop() else { break };
-            let (h, merged) = &candidates[candidate];
-            n_collapsed += usize::from(collapsed(surface, gate, (*h, merged), &mut touched));
+            n_collapsed += usize::from(collapsed(surface, gate, &merges[candidate], &mut touched));
             continue;
         }
         // The others are judged by all spokes when their turn may have come.
         let n = FEWEST_JUDGED.max(n_wanted - n_collapsed).min(bounds.len());
         let (batch, rest) = bounds.split_at(n);
         bounds = rest;
-        let is_free = |bound: &&Rank| is_free(surface, candidates[bound.candidate].0, &touched);
-        let open: Vec<Rank> = batch.iter().filter(is_free).copied().collect();
-        let chosen: Vec<_> = open.iter().map(|bound| candidates[bound.candidate]).collect();
-        let others = judged(surface, &chosen, |fan| {
-            take_longest(fan);
-            std::mem::take(fan)
-        });
-        let whole = open.iter().zip(others).map(|(bound, rest)| Rank {
-            error: bound.error.max(rest.error),
-            candidate: bound.candidate,
-        });
-        ranks.extend(whole.filter(|rank| is_below(rank.error)).map(Reverse));
+        let is_open = |bound: &&Rank| is_free(surface, merges[bound.candidate].h, &touched);
+        let open: Vec<usize> = batch.iter().filter(is_open).map(|bound| bound.candidate).collect();
+        judge_whole(surface, &mut merges, &open);
+        let rank = |candidate: usize| Some(Rank { error: merges[candidate].whole?, candidate });
+        ranks.extend(open.into_iter().filter_map(rank).filter(is_below).map(Reverse));
     }
+    known.keep(time, merges);
     n_collapsed as u64
 }
 
-/// A candidate by the error of the curves that merging gives: the least first, then in their order.
+/// A merge by the error of the curves that it gives: the least first, then in their order.
 #[derive(Clone, Copy, Debug)]
 struct Rank {
     error: f64,
@@ -91,18 +91,19 @@ impl Eq for Rank {}
 fn collapsed(
     surface: &mut SurfaceMesh<'_>,
     gate: &Gate,
-    (h, merged): (HalfEdge, &Vertex),
+    &Merge { h, merged, .. }: &Merge,
     touched: &mut [bool],
 ) -> bool {
+    let Some(merged) = merged else { return false };
     // The surroundings are as they were, but the link condition may look beyond them.
-    if !is_free(surface, h, touched) || !surface.collapse_is_better(gate, h, merged, ROOM) {
+    if !is_free(surface, h, touched) || !surface.collapse_is_better(gate, h, &merged, ROOM) {
         return false;
     }
     let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
     for v in ring(surface, h).chain(ends) {
         touched[v as usize] = true;
     }
-    surface.collapse(h, *merged);
+    surface.collapse(h, merged);
     true
 }
 
@@ -112,18 +113,42 @@ fn is_free(surface: &SurfaceMesh<'_>, h: HalfEdge, touched: &[bool]) -> bool {
         && ring(surface, h).chain([surface.mesh.origin(h)]).all(|v| !touched[v as usize])
 }
 
-/// Of each candidate the largest error of those curves about the merged vertex that are picked;
+/// Judges the longest curve of each merge of which it is not known.
+fn judge_longest(surface: &SurfaceMesh<'_>, merges: &mut [Merge]) {
+    let is_open = |k: &usize| merges[*k].longest.is_none() && merges[*k].merged.is_some();
+    let open: Vec<usize> = (0..merges.len()).filter(is_open).collect();
+    let errors = judged(surface, merges, &open, |fan| vec![take_longest(fan)]);
+    for (k, error) in open.into_iter().zip(errors) {
+        merges[k].longest = Some(error);
+    }
+}
+
+/// Judges the other curves of those merges of `among` of which they are not known.
+fn judge_whole(surface: &SurfaceMesh<'_>, merges: &mut [Merge], among: &[usize]) {
+    let open = among.iter().copied().filter(|&k| merges[k].whole.is_none());
+    let open: Vec<usize> = open.collect();
+    let errors = judged(surface, merges, &open, |fan| {
+        take_longest(fan);
+        std::mem::take(fan)
+    });
+    for (k, error) in open.into_iter().zip(errors) {
+        merges[k].whole = merges[k].longest.map(|longest| longest.max(error));
+    }
+}
+
+/// Of each chosen merge the largest error of those curves about the merged vertex that are picked;
 /// 0 if none are.
-fn judged<'s>(
-    surface: &'s SurfaceMesh<'_>,
-    candidates: &'s [(HalfEdge, Vertex)],
-    pick: impl Fn(&mut Vec<JudgedEdge<'s>>) -> Vec<JudgedEdge<'s>> + Sync,
-) -> Vec<Rank> {
-    let tasks: Vec<_> = candidates.chunks(CANDIDATES_A_TASK).collect();
+fn judged(
+    surface: &SurfaceMesh<'_>,
+    merges: &[Merge],
+    chosen: &[usize],
+    pick: impl for<'s> Fn(&mut Vec<JudgedEdge<'s>>) -> Vec<JudgedEdge<'s>> + Sync,
+) -> Vec<f64> {
+    let tasks: Vec<_> = chosen.chunks(CANDIDATES_A_TASK).collect();
     let errors = map(surface.host, tasks.len(), |task| {
         let (mut owners, mut edges) = (Vec::new(), Vec::new());
-        for (k, candidate) in tasks[task].iter().enumerate() {
-            edges.extend(pick(&mut fan(surface, candidate)));
+        for (k, &candidate) in tasks[task].iter().enumerate() {
+            edges.extend(pick(&mut fan(surface, &merges[candidate])));
             owners.resize(edges.len(), k);
         }
         let mut errors = vec![0.0f64; tasks[task].len()];
@@ -133,21 +158,18 @@ fn judged<'s>(
         }
         errors
     });
-    let ranks = errors.concat().into_iter().enumerate();
-    ranks.map(|(candidate, error)| Rank { error, candidate }).collect()
+    errors.concat()
 }
 
-/// The edges about a merged vertex.
-fn fan<'s>(
-    surface: &'s SurfaceMesh<'_>,
-    (h, merged): &'s (HalfEdge, Vertex),
-) -> Vec<JudgedEdge<'s>> {
+/// The edges about a merged vertex; none if there is no such vertex.
+fn fan<'s>(surface: &'s SurfaceMesh<'_>, merge: &'s Merge) -> Vec<JudgedEdge<'s>> {
+    let (h, Some(merged)) = (merge.h, &merge.merged) else { return Vec::new() };
     let spoke = |v: u32| JudgedEdge { ends: [merged, surface.at(v)], wings: None };
     // A wing comes twice, and its curve need not be judged twice.
-    let end = surface.mesh.origin(*h);
+    let end = surface.mesh.origin(h);
     let second = surface.mesh.valence(end) - 1;
-    let wings = surface.wings(*h).unwrap_or([end; 2]);
-    let places = ring(surface, *h).enumerate();
+    let wings = surface.wings(h).unwrap_or([end; 2]);
+    let places = ring(surface, h).enumerate();
     places.filter(|(k, v)| *k < second || !wings.contains(v)).map(|(_, v)| spoke(v)).collect()
 }
 
@@ -157,13 +179,15 @@ fn take_longest<'s>(fan: &mut Vec<JudgedEdge<'s>>) -> JudgedEdge<'s> {
     fan.swap_remove(longest.expect("invariant: an edge has vertices about it"))
 }
 
-/// Edges in the quietest places whose merging the gate bears, with the merged vertex.
-fn collapse_candidates(
+/// Edges in the quietest places that can be merged, with what is known of it and whether the gate
+/// bears it.
+fn merges_looked_at(
     surface: &SurfaceMesh<'_>,
     gate: &Gate,
     errors: &[EdgeError],
     (limit, n_wanted): (f64, usize),
-) -> Vec<(HalfEdge, Vertex)> {
+    known: &KnownMerges,
+) -> Vec<Merge> {
     let mut around = vec![0.0f64; surface.mesh.vertex_rows()];
     for &(h, error) in errors {
         for v in [surface.mesh.origin(h), surface.mesh.target(h)] {
@@ -178,17 +202,38 @@ fn collapse_candidates(
         errors.iter().map(|&(h, _)| (h, score(h))).filter(|&(_, e)| e < limit).collect();
     // Neighbours exclude each other and the gate refuses some: look at more than are wanted.
     let quiet = first_by(quiet, 6 * n_wanted + 32, |x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
-    let middles: Vec<_> = quiet.iter().map(|&(h, _)| surface.middle(h)).collect();
-    let merged = surface.feet(&middles);
-    let found: Vec<(HalfEdge, Vertex)> =
-        quiet.iter().zip(merged).filter_map(|(&(h, _), merged)| Some((h, merged?))).collect();
-    let tasks: Vec<_> = found.chunks(CANDIDATES_A_TASK).collect();
+    let tasks: Vec<_> = quiet.chunks(EDGES_A_TASK).collect();
     map(surface.host, tasks.len(), |task| {
-        let is_good =
-            |(h, merged): &&(HalfEdge, Vertex)| surface.collapse_is_better(gate, *h, merged, ROOM);
-        tasks[task].iter().filter(is_good).copied().collect::<Vec<_>>()
+        let edges = tasks[task].iter().map(|&(h, _)| h).filter(|&h| surface.can_collapse(h));
+        looked_at(surface, gate, edges, known)
     })
     .concat()
+}
+
+/// The merges of edges that can be merged.
+fn looked_at(
+    surface: &SurfaceMesh<'_>,
+    gate: &Gate,
+    edges: impl Iterator<Item = HalfEdge>,
+    known: &KnownMerges,
+) -> Vec<Merge> {
+    let unknown = |h| Merge { h, merged: None, longest: None, whole: None };
+    let (mut merges, mut new): (Vec<Merge>, Vec<usize>) = (Vec::new(), Vec::new());
+    for h in edges {
+        let merge = known.get(surface, h);
+        if merge.is_none() {
+            new.push(merges.len());
+        }
+        merges.push(merge.unwrap_or_else(|| unknown(h)));
+    }
+    let tries = new.iter().map(|&k| (surface.middle(merges[k].h), f64::INFINITY));
+    let feet = surface.feet_within(tries);
+    for (k, foot) in new.into_iter().zip(feet) {
+        let h = merges[k].h;
+        merges[k].merged =
+            foot.filter(|merged| surface.faces_left_are_better(gate, h, merged, ROOM));
+    }
+    merges
 }
 
 /// The vertices about an edge: the neighbours of its ends without the ends; wings come twice.

@@ -181,7 +181,7 @@ impl<'a> SurfaceMesh<'a> {
     }
 
     /// Whether the ends of `h` can become `merged` and all faces left about them would be better
-    /// than `limit`. They cannot where a vertex would keep fewer than four edges.
+    /// than `limit`.
     pub(crate) fn collapse_is_better(
         &self,
         gate: &Gate,
@@ -189,16 +189,32 @@ impl<'a> SurfaceMesh<'a> {
         merged: &Vertex,
         limit: f64,
     ) -> bool {
-        if !self.mesh.can_collapse(h) {
-            return false;
-        }
-        let (Some(o), Some(wings)) = (self.mesh.opposite(h), self.wings(h)) else { return false };
+        self.can_collapse(h) && self.faces_left_are_better(gate, h, merged, limit)
+    }
+
+    /// Whether the ends of `h` can become one vertex. They cannot where a vertex would keep fewer
+    /// than four edges.
+    pub(crate) fn can_collapse(&self, h: HalfEdge) -> bool {
+        let Some(wings) = self.wings(h) else { return false };
         let ends = [self.mesh.origin(h), self.mesh.target(h)];
-        let merged_valence = self.mesh.valence(ends[0]) + self.mesh.valence(ends[1]) - 4;
-        if !(4..=10).contains(&merged_valence) || wings.iter().any(|&v| self.mesh.valence(v) < 5) {
-            return false;
-        }
+        let sum = self.mesh.valence(ends[0]) + self.mesh.valence(ends[1]);
+        (8..=14).contains(&sum)
+            && wings.iter().all(|&v| self.mesh.valence(v) >= 5)
+            && self.mesh.can_collapse(h)
+    }
+
+    /// Whether all faces left about the ends of `h` would be better than `limit` if those were
+    /// `merged`.
+    pub(crate) fn faces_left_are_better(
+        &self,
+        gate: &Gate,
+        h: HalfEdge,
+        merged: &Vertex,
+        limit: f64,
+    ) -> bool {
+        let Some(o) = self.mesh.opposite(h) else { return false };
         let removed = [h.face(), o.face()];
+        let ends = [self.mesh.origin(h), self.mesh.target(h)];
         ends.iter().all(|&v| self.fan_is_better(gate, (v, removed), merged, limit))
     }
 
