@@ -1,6 +1,6 @@
 # The list of commands. `make` alone prints it.
 .DEFAULT_GOAL := help
-.PHONY: help build deccube paper test lint unit doc readers bench bench-peers library-bench cluster reliability fuzz fuzz-check golden pictures docs clean
+.PHONY: help build deccube paper test lint unit doc readers bench bench-peers bench-decimate library-bench cluster reliability fuzz fuzz-check golden pictures docs clean
 
 CARGO ?= cargo
 TARGET := $(or $(CARGO_TARGET_DIR),target)
@@ -30,7 +30,7 @@ paper: build ## convert all models of the paper and print its Table 3 with our f
 		--out out/paper/$$model || exit $$?; done
 	$(CARGO) run --release -q -p isospline --example paper_table -- $(PAPER:%=out/paper/%)
 
-test: lint unit docs readers ## format and lint checks, all tests, docs, foreign readers
+test: lint docs unit readers ## format and lint checks, docs, all tests, foreign readers
 
 lint: ## rustfmt and clippy, warnings are errors
 	$(CARGO) fmt --all --check
@@ -66,6 +66,11 @@ bench-peers: build ## the decorative cube to 1e-3 .. 1e-8, beside marching cubes
 	$(CARGO) build --release -q --manifest-path peers/Cargo.toml --target-dir $(TARGET)/peers
 	.venv/bin/python peers/compare.py $(ISOSPLINE) $(TARGET)/peers/release/isospline-peers \
 		configs/deccube.toml out/peers
+
+bench-decimate: build ## decimation beside open3d (needs Python and libusb)
+	test -x .venv/bin/python || python3 -m venv .venv
+	.venv/bin/pip install -q numpy scikit-image open3d
+	.venv/bin/python peers/decimate.py $(ISOSPLINE) configs/deccube.toml out/decimate
 
 reliability: ## try what may happen to a run and print the scoreboard (all of it as root)
 	$(CARGO) run --release -q -p isospline-tests --bin scoreboard

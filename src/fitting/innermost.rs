@@ -3,7 +3,7 @@
 //! The interior points of that patch are nearest to samples of the surface, so what it leaves of
 //! their distance is orthogonal to all that its interior points can do, the innermost among them:
 //! least squares of the distance to the samples is least squares of the distance to the patch, and
-//! needs neither samples nor the field [derived].
+//! needs neither samples nor the field \[derived\].
 //
 // symbols: G the Gram matrix of the interior points over the samples, f the innermost slots, o the
 // other ones, x points of the patch before G1, y points after it

@@ -36,7 +36,7 @@ const OWNERS: [(&str, &[&str]); 6] = [
     ("model.box", &STAGES),
     ("model.parameters.r", &STAGES),
     ("target.faces", &["polygonize", "decimate", "adapt"]),
-    ("target.fit", &["adapt", "network", "relax"]),
+    ("target.fit", &["decimate", "adapt", "network", "relax"]),
 ];
 
 /// Stages that the other value of a key leaves out.
