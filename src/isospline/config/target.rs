@@ -40,7 +40,7 @@ pub const DEFAULT_FACES: u32 = 2000;
 const LEAST_TOLERANCE: f64 = 1e-12;
 
 /// Surfaces made at most after one with unfit patches: smooth models take two or three, boxes and
-/// capsules with planar and cylindrical parts up to a dozen, fewer of them unfit each time.
+/// capsules with planar and cylindrical parts up to ten, with ups and downs on the way.
 pub const DEFAULT_MENDS: u32 = 12;
 
 /// Largest `target.mends`.
