@@ -14,7 +14,7 @@ use crate::affine::{ADD_ROUNDING, Affine, MUL_ROUNDING, REST_ROUNDING, TINY, ste
 use crate::instruction_set::{Kernel, run_widest};
 use crate::interval::Interval;
 use crate::operation::{BinaryOp, UnaryOp};
-use crate::tape::{Instruction, Op, Tape};
+use crate::tape::{Instruction, Op, Tape, others};
 use std::cell::Cell;
 
 /// Boxes a block: two vectors of the widest kind.
@@ -108,23 +108,25 @@ fn run(instructions: &[Instruction], file: &mut [Lanes]) {
 #[inline(always)]
 fn interpret(instructions: &[Instruction], file: &mut [Lanes]) {
     for instruction in instructions {
-        let argument = |k: usize| &file[instruction.args[k] as usize];
-        let mut out = ZERO;
+        let (out, others) = others(file, instruction.out as usize);
+        let argument = |k: usize| others(instruction.args[k] as usize);
+        let constant = instruction.constant;
         match instruction.op {
-            Op::Constant => out.middle = [instruction.constant; LANES],
-            Op::Unary(UnaryOp::Neg) => negate(argument(0), &mut out),
-            Op::Binary(BinaryOp::Add) => add(argument(0), argument(1), 1.0, &mut out),
-            Op::Binary(BinaryOp::Sub) => add(argument(0), argument(1), -1.0, &mut out),
-            Op::Binary(BinaryOp::Mul) => multiply(argument(0), argument(1), &mut out),
-            Op::Power(n) if n > 0 => power(argument(0), n as u32, &mut out),
+            Op::Constant => *out = Lanes { middle: [constant; LANES], ..ZERO },
+            Op::AddConstant => add_constant(constant, 1.0, argument(0), out),
+            Op::ConstantSub => add_constant(constant, -1.0, argument(0), out),
+            Op::Scale => scale(constant, argument(0), out),
+            Op::Unary(UnaryOp::Neg) => negate(argument(0), out),
+            Op::Binary(BinaryOp::Add) => add(argument(0), argument(1), 1.0, out),
+            Op::Binary(BinaryOp::Sub) => add(argument(0), argument(1), -1.0, out),
+            Op::Binary(BinaryOp::Mul) => multiply(argument(0), argument(1), out),
+            Op::Power(n) if n > 0 => power(argument(0), n as u32, out),
             _ => {
                 for lane in 0..LANES {
-                    let form = step(instruction, |k| file[instruction.args[k] as usize].get(lane));
-                    out.set(lane, &form);
+                    out.set(lane, &step(instruction, |k| argument(k).get(lane)));
                 }
             }
         }
-        file[instruction.out as usize] = out;
     }
 }
 
@@ -153,6 +155,36 @@ fn add(a: &Lanes, b: &Lanes, sign: f64, out: &mut Lanes) {
         out.slopes[1][i] = y;
         out.slopes[2][i] = z;
         out.rest[i] = (a.rest[i] + b.rest[i] + ADD_ROUNDING * size) * REST_ROUNDING;
+    }
+}
+
+/// `k + sign * a`.
+#[inline(always)]
+fn add_constant(k: f64, sign: f64, a: &Lanes, out: &mut Lanes) {
+    for i in 0..LANES {
+        let (x, y, z) = (a.slopes[0][i], a.slopes[1][i], a.slopes[2][i]);
+        let middle = k + sign * a.middle[i];
+        let size = middle.abs() + x.abs() + (y.abs() + z.abs());
+        out.middle[i] = middle;
+        out.slopes[0][i] = sign * x;
+        out.slopes[1][i] = sign * y;
+        out.slopes[2][i] = sign * z;
+        out.rest[i] = (a.rest[i] + ADD_ROUNDING * size) * REST_ROUNDING;
+    }
+}
+
+/// `k * a`.
+#[inline(always)]
+fn scale(k: f64, a: &Lanes, out: &mut Lanes) {
+    let size = k.abs();
+    for i in 0..LANES {
+        let (a0, ax, ay, az) = (a.middle[i], a.slopes[0][i], a.slopes[1][i], a.slopes[2][i]);
+        let a_size = a0.abs() + ax.abs() + (ay.abs() + az.abs());
+        out.middle[i] = k * a0;
+        out.slopes[0][i] = k * ax;
+        out.slopes[1][i] = k * ay;
+        out.slopes[2][i] = k * az;
+        out.rest[i] = (a.rest[i] * size + MUL_ROUNDING * (a_size * size)) * REST_ROUNDING + TINY;
     }
 }
 

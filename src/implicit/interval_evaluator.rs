@@ -1,6 +1,7 @@
 //! Runs a tape over a box.
 
 use crate::interval::Interval;
+use crate::operation::BinaryOp;
 use crate::tape::{Instruction, Op, Tape};
 use std::cell::Cell;
 
@@ -28,8 +29,12 @@ pub(crate) fn enclose<const K: usize>(tape: &Tape, domain: [Interval; 3]) -> [In
 
 /// The result of one instruction from its arguments.
 pub(crate) fn step(instruction: &Instruction, argument: impl Fn(usize) -> Interval) -> Interval {
+    let constant = || Interval::point(instruction.constant);
     match instruction.op {
-        Op::Constant => Interval::point(instruction.constant),
+        Op::Constant => constant(),
+        Op::AddConstant => argument(0).binary(BinaryOp::Add, constant()),
+        Op::ConstantSub => constant().binary(BinaryOp::Sub, argument(0)),
+        Op::Scale => argument(0).binary(BinaryOp::Mul, constant()),
         Op::Unary(op) => argument(0).unary(op),
         Op::Binary(op) => argument(0).binary(op, argument(1)),
         Op::Power(n) => argument(0).power(n),

@@ -14,7 +14,7 @@ use crate::instruction_set::{Kernel, run_widest};
 use crate::interval::{Interval, add_down, mul_down, mul_up};
 use crate::interval_evaluator::{enclose, step};
 use crate::operation::{BinaryOp, UnaryOp};
-use crate::tape::{Instruction, Op, Tape};
+use crate::tape::{Instruction, Op, Tape, others};
 use std::cell::Cell;
 
 /// Boxes a block: long enough that loops over them are not unrolled before they are vectorised.
@@ -73,6 +73,11 @@ pub(crate) fn enclose_all<const K: usize, T>(
 
 impl Lanes {
     #[inline(always)]
+    fn of(constant: f64) -> Self {
+        Self { lo: [constant; LANES], hi: [constant; LANES] }
+    }
+
+    #[inline(always)]
     fn get(&self, lane: usize) -> Interval {
         Interval::new(self.lo[lane], self.hi[lane])
     }
@@ -105,30 +110,26 @@ fn run(instructions: &[Instruction], file: &mut [Lanes]) {
 #[inline(always)]
 fn interpret(instructions: &[Instruction], file: &mut [Lanes]) {
     for instruction in instructions {
-        let argument = |k: usize| file[instruction.args[k] as usize];
-        let mut out = Lanes { lo: [0.0; LANES], hi: [0.0; LANES] };
+        let (out, others) = others(file, instruction.out as usize);
+        let argument = |k: usize| others(instruction.args[k] as usize);
+        let constant = || Lanes::of(instruction.constant);
         match instruction.op {
-            Op::Constant => {
-                out = Lanes { lo: [instruction.constant; LANES], hi: [instruction.constant; LANES] }
-            }
-            Op::Unary(UnaryOp::Neg) => negate(&argument(0), &mut out),
-            Op::Binary(BinaryOp::Add) => add(&argument(0), &argument(1), &mut out),
-            Op::Binary(BinaryOp::Sub) => {
-                let mut mirrored = out;
-                negate(&argument(1), &mut mirrored);
-                add(&argument(0), &mirrored, &mut out);
-            }
-            Op::Binary(BinaryOp::Mul) => multiply(&argument(0), &argument(1), &mut out),
-            Op::Power(n) if n > 0 && n % 2 == 0 => even_power(&argument(0), n as u32, &mut out),
-            Op::Power(n) if n > 0 => odd_power(&argument(0), n as u32, &mut out),
+            Op::Constant => *out = constant(),
+            Op::AddConstant => add(argument(0), &constant(), out),
+            Op::ConstantSub => subtract(&constant(), argument(0), out),
+            Op::Scale => multiply(argument(0), &constant(), out),
+            Op::Unary(UnaryOp::Neg) => negate(argument(0), out),
+            Op::Binary(BinaryOp::Add) => add(argument(0), argument(1), out),
+            Op::Binary(BinaryOp::Sub) => subtract(argument(0), argument(1), out),
+            Op::Binary(BinaryOp::Mul) => multiply(argument(0), argument(1), out),
+            Op::Power(n) if n > 0 && n % 2 == 0 => even_power(argument(0), n as u32, out),
+            Op::Power(n) if n > 0 => odd_power(argument(0), n as u32, out),
             _ => {
                 for lane in 0..LANES {
-                    let of = |k: usize| file[instruction.args[k] as usize].get(lane);
-                    out.set(lane, step(instruction, of));
+                    out.set(lane, step(instruction, |k| argument(k).get(lane)));
                 }
             }
         }
-        file[instruction.out as usize] = out;
     }
 }
 
@@ -147,6 +148,13 @@ fn add(a: &Lanes, b: &Lanes, out: &mut Lanes) {
         let hi = -add_down(-a.hi[i], -b.hi[i]);
         (out.lo[i], out.hi[i]) = known(lo, hi, lo.is_nan() | hi.is_nan());
     }
+}
+
+#[inline(always)]
+fn subtract(a: &Lanes, b: &Lanes, out: &mut Lanes) {
+    let mut mirrored = Lanes::of(0.0);
+    negate(b, &mut mirrored);
+    add(a, &mirrored, out);
 }
 
 /// Both bounds NaN if nothing is known.

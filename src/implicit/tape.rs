@@ -47,6 +47,16 @@ pub(crate) struct Instruction {
     pub(crate) constant: f64,
 }
 
+/// The register `out` to write, and how to read the others: a result never takes the place of an
+/// argument.
+#[inline]
+pub(crate) fn others<'a, T>(file: &'a mut [T], out: usize) -> (&'a mut T, impl Fn(usize) -> &'a T) {
+    let (below, rest) = file.split_at_mut(out);
+    let (out_register, above) = rest.split_first_mut().expect("invariant: a register a step");
+    let (below, above) = (&*below, &*above);
+    (out_register, move |k: usize| if k < out { &below[k] } else { &above[k - out - 1] })
+}
+
 /// A compiled graph.
 #[derive(Clone, Debug)]
 pub(crate) struct Tape {
@@ -85,6 +95,7 @@ struct Plan<'a> {
     absorbed: Vec<bool>,
     /// Nodes with a register: needed ones, without absorbed products and immediate constants.
     live: Vec<bool>,
+    /// Whether the arithmetic of rounded numbers may be told in fewer steps.
     fuse: bool,
 }
 
@@ -170,9 +181,6 @@ impl<'a> Plan<'a> {
     fn arithmetic(&self, op: BinaryOp, a: NodeId, b: NodeId) -> (Op, [NodeId; 4], usize, f64) {
         let none = NodeId(0);
         let plain = (Op::Binary(op), [a, b, none, none], 2, 0.0);
-        if !self.fuse {
-            return plain;
-        }
         match op {
             BinaryOp::Add => self.sum(a, b).or_else(|| self.sum(b, a)).unwrap_or(plain),
             BinaryOp::Sub => self.difference(a, b).unwrap_or(plain),
@@ -181,7 +189,7 @@ impl<'a> Plan<'a> {
                 (_, Some(k)) => (Op::Scale, [a, none, none, none], 1, k),
                 _ => plain,
             },
-            BinaryOp::Div => match self.dag.value_of(a) {
+            BinaryOp::Div if self.fuse => match self.dag.value_of(a) {
                 Some(k) => (Op::ConstantDiv, [b, none, none, none], 1, k),
                 None => plain,
             },

@@ -3,7 +3,7 @@
 use crate::bulk;
 use isospline_geometry::{EditMesh, HalfEdge, TriangleMesh, Vec3};
 use isospline_implicit::Jet1;
-use isospline_stage::{Ctx, Serial, map};
+use isospline_stage::{Ctx, Host, Serial, map};
 
 /// Edges shorter than this are merged, of the cell side at both ends. At 0.5 more than half of
 /// the triangles go and the rest are well shaped; above it, corners of thin sheets are refused
@@ -18,6 +18,9 @@ const LEAST_SHAPE: f64 = 0.1;
 /// left to the pass over the whole mesh.
 const TILE: usize = 32_768;
 
+/// Faces whose edges are measured in a task.
+const FACES_A_TASK: usize = 4096;
+
 /// Merges edges shorter than half a cell side (`sides[v]` at vertex v) wherever that keeps the
 /// topology (link condition) and turns no face; vertices stay where they are or go.
 ///
@@ -28,7 +31,7 @@ pub(crate) fn merge(ctx: &Ctx<'_>, mesh: TriangleMesh, sides: Vec<f64>) -> Trian
         if mesh.faces.len() > TILE { merge_tiles(ctx, mesh, &sides) } else { (mesh, sides) };
     let normals = normals(ctx, &mesh.positions);
     let mut edit = EditMesh::part(mesh).expect("invariant: marching tetrahedra make a manifold");
-    merge_all(&mut edit, &normals, &sides, &[]);
+    merge_all(ctx.host, &mut edit, &normals, &sides, &[]);
     edit.compact()
 }
 
@@ -75,12 +78,12 @@ fn merge_tile(
     for v in edit.vertices().filter(|&v| !edit.on_border(v)) {
         kept[v as usize] = edit.neighbours(v).any(|n| edit.on_border(n));
     }
-    merge_all(&mut edit, &normals, &sides, &kept);
+    merge_all(&Serial, &mut edit, &normals, &sides, &kept);
     edit.live_faces().map(|f| edit.face(f).map(|v| vertices[v as usize])).collect()
 }
 
 /// Merges short edges, but those of `kept` vertices, until none is left that may go.
-fn merge_all(edit: &mut EditMesh, normals: &[Vec3], sides: &[f64], kept: &[bool]) {
+fn merge_all(host: &dyn Host, edit: &mut EditMesh, normals: &[Vec3], sides: &[f64], kept: &[bool]) {
     let is_kept = |v: u32| kept.get(v as usize).copied().unwrap_or(false);
     // A merge may free another that was refused before, say about a vertex with three faces: one
     // of an edge about whose ends the faces have changed.
@@ -88,7 +91,7 @@ fn merge_all(edit: &mut EditMesh, normals: &[Vec3], sides: &[f64], kept: &[bool]
     loop {
         let before = std::mem::replace(&mut changed, vec![false; edit.vertex_rows()]);
         let mut merged = false;
-        for (_, h) in short_edges(edit, sides) {
+        for h in short_edges(host, edit, sides) {
             // Earlier merges rename and remove: look again at what is there now.
             if !edit.is_face(h.face()) {
                 continue;
@@ -134,17 +137,23 @@ fn normals(ctx: &Ctx<'_>, points: &[Vec3]) -> Vec<Vec3> {
 }
 
 /// Short edges from the shortest up, equal ones by their half-edge.
-fn short_edges(edit: &EditMesh, sides: &[f64]) -> Vec<(f64, HalfEdge)> {
-    let length = |h: HalfEdge| {
+fn short_edges(host: &dyn Host, edit: &EditMesh, sides: &[f64]) -> Vec<HalfEdge> {
+    // Lengths are not negative: their bits have their order.
+    let key = |h: HalfEdge| {
         let (a, b) = (edit.origin(h), edit.target(h));
         let length = distance(edit, a, b);
-        is_short(length, sides, a, b).then_some((length, h))
+        is_short(length, sides, a, b)
+            .then_some(u128::from(length.to_bits()) << 32 | u128::from(h.0))
     };
-    let all = edit.edge_list(0..edit.face_rows());
-    let mut edges = Vec::with_capacity(all.len());
-    edges.extend(all.into_iter().filter_map(length));
-    edges.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    edges
+    let rows = edit.face_rows();
+    let shares = map(host, rows.div_ceil(FACES_A_TASK), |i| {
+        let first = i * FACES_A_TASK;
+        let edges = edit.edge_list(first..rows.min(first + FACES_A_TASK));
+        edges.into_iter().filter_map(key).collect::<Vec<u128>>()
+    });
+    let mut keys = shares.concat();
+    keys.sort_unstable();
+    keys.into_iter().map(|key| HalfEdge(key as u32)).collect()
 }
 
 fn distance(edit: &EditMesh, a: u32, b: u32) -> f64 {
@@ -164,22 +173,29 @@ fn may_move(edit: &EditMesh, normals: &[Vec3], from: u32, to: u32) -> bool {
         }
         let at = |v: u32| edit.positions[v as usize];
         let (old, new) = ([at(from), at(b), at(c)], [at(to), at(b), at(c)]);
-        let corner_normals = [to, b, c].map(|v| normals[v as usize]);
-        shape(&new) >= shape(&old).min(LEAST_SHAPE)
-            && cosine(&new, &corner_normals) >= cosine(&old, &corner_normals).min(LEAST_COSINE)
+        let directions = [to, b, c].map(|v| normals[v as usize]);
+        keeps(shape, [&old, &new], LEAST_SHAPE)
+            && keeps(|face| cosine(face, &directions), [&old, &new], LEAST_COSINE)
     })
+}
+
+/// Whether a figure stays at least at `least`, or at what it was.
+fn keeps(figure: impl Fn(&[Vec3; 3]) -> f64, [old, new]: [&[Vec3; 3]; 2], least: f64) -> bool {
+    let found = figure(new);
+    found >= least || found >= figure(old)
 }
 
 fn normal([a, b, c]: &[Vec3; 3]) -> Vec3 {
     (b - a).cross(&(c - a))
 }
 
-/// Least cosine of the angles between a face and the given directions; -1 where that is not
-/// known (kinks, flat faces).
+/// Least cosine of the angles between a face and the given directions, of those that are known:
+/// at kinks they are not. 1 for flat faces, of which the shape tells enough.
 fn cosine(corners: &[Vec3; 3], directions: &[Vec3; 3]) -> f64 {
     let n = normal(corners);
-    let least = directions.iter().map(|d| n.dot(d) / n.norm()).fold(1.0, f64::min);
-    if least.is_nan() { -1.0 } else { least }
+    let length = n.norm();
+    let least = directions.iter().map(|d| n.dot(d)).fold(length, f64::min);
+    if length == 0.0 { 1.0 } else { least / length }
 }
 
 /// `4 sqrt(3) area / sum of squared sides`: 1 if equilateral, 0 if flat.
