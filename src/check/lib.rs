@@ -30,6 +30,6 @@ mod seeded_defects;
 pub use checker::{Job, check};
 pub use distance::{UnfitFace, unfit_faces};
 pub use lent_threads::{ForEach, on_this_thread};
-pub use params::{CheckParams, Expected};
+pub use params::{CheckParams, DEFAULT_ERROR, Expected};
 pub use report::{CheckReport, Component, EdgeDefects, Place};
 pub use surface::{Net, Surface, SurfaceError};

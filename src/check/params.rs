@@ -47,7 +47,7 @@ pub struct Expected {
 }
 
 /// Largest relative distance where neither the table nor the model names one.
-const DEFAULT_ERROR: f64 = 1e-3;
+pub const DEFAULT_ERROR: f64 = 1e-3;
 
 impl CheckParams {
     /// Names the first limit out of its range: `(key, what is wrong)`.

@@ -270,12 +270,12 @@ fn the_report_is_the_same_in_all_bits_whatever_order_the_blocks_run_in() {
     let surface = Knots::surface(24, 12);
     let backwards = |n: usize, body: &(dyn Fn(usize) + Sync)| (0..n).rev().for_each(body);
     let (params, field) = (CheckParams::default(), torus());
-    let (expected, repairs) = (EXPECTED, BTreeMap::from([("adapt.splits".to_owned(), 3)]));
+    let (expected, repairs) = (EXPECTED, BTreeMap::from([("adapt.edges_split".to_owned(), 3)]));
     let job = Job { surface: &surface, field: &field, expected, params: &params, repairs };
     let json = |report: CheckReport| serde_json::to_string(&report).unwrap();
     let found = json(check(&job, &backwards));
     assert_eq!(found, json(check(&job, &on_this_thread)));
-    assert!(found.contains(r#""repairs":{"adapt.splits":3}"#), "{found}");
+    assert!(found.contains(r#""repairs":{"adapt.edges_split":3}"#), "{found}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use isospline_artifact::{Container, MemoryStore, StoreError};
 use isospline_check::{CheckParams, CheckReport, Expected, Job, Surface, SurfaceError};
 use isospline_geometry::{Aabb, TriangleMesh};
 use isospline_implicit::{Field, InsideError, Oriented};
+use isospline_network::Method;
 use isospline_pipeline::{
     Event, Given, Graph, ModelKey, Pipeline, Registry, RunError, RunOptions, RunReport, Scene,
     Threads,
@@ -215,13 +216,14 @@ impl<'f> ConvertJob<'_, 'f> {
             return Ok(best);
         }
         let mut mending = Mending::default();
-        mending.add(best.unfit(self.options.run.threads)?);
+        let (method, threads) = (params.network.method, self.options.run.threads);
+        mending.add(best.unfit(method, threads)?);
         while !mending.is_over(self.options.mends, faces) {
             let mut params = params.clone();
             mending.tried().put_into(&mut params);
             let n_before = mending.n_tried();
             let made = self.whole(&params)?;
-            mending.add(made.unfit(self.options.run.threads)?);
+            mending.add(made.unfit(method, threads)?);
             if mending.n_kept() == n_before {
                 best = made;
             }
@@ -300,9 +302,9 @@ impl Conversion<'_> {
         Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
     }
 
-    fn unfit(&self, threads: usize) -> Result<Vec<Unfit>, ConvertError> {
+    fn unfit(&self, method: Method, threads: usize) -> Result<Vec<Unfit>, ConvertError> {
         let surface = Surface::from_patches(&self.patches()?)?;
-        Ok(unfit(&surface, &self.field, self.expected.tolerance, threads))
+        Ok(unfit(&surface, &self.field, self.expected.tolerance, method, threads))
     }
 
     fn found(&self, tolerance: f64) -> Result<Found, ConvertError> {

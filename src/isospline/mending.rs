@@ -1,18 +1,20 @@
 //! Patches that are unfit become places where the next surface is made otherwise, until none is.
 //!
-//! A patch folds where its face is too flat for the bulge of the curves about it, and a few may lie
-//! beyond a tolerance that all others keep. Which faces do is seen for certain only when the patches
-//! are made. Each is then split across its longest side, the rest of the mesh stays as it is but for
-//! as many vertices merged where they are missed least, and the surface is made again.
+//! A patch folds where its face is too flat for the bulge of the curves about it, or where a side
+//! is so short that its curve cannot have the curvatures of both ends, and a few may lie beyond a
+//! tolerance that all others keep. Which faces do is seen for certain only when the patches are
+//! made. Each is then edited: the ends of a very short side are merged, others are split across
+//! their longest side. The rest of the mesh stays as it is but for as many vertices merged where
+//! they are missed least, and the surface is made again.
 //!
 //! Where planes or cylinders are parts of the surface patches fold for another reason: curves of
 //! least normal distance may run along a plane as they like, and where curvature jumps at its rim
 //! they gain by that. There the curves of the paper are no farther away, so a face whose patch folds
-//! gets those first, and is split if it folds with them too.
+//! gets those first, and is edited if it folds with them too.
 
 use crate::config::StageParams;
 use isospline_adapt::Improve;
-use isospline_check::{Surface, unfit_faces};
+use isospline_check::{DEFAULT_ERROR, Surface, unfit_faces};
 use isospline_fitting::shape::second_fundamental_form;
 use isospline_geometry::Vec3;
 use isospline_implicit::Field;
@@ -25,10 +27,10 @@ type Place = [f64; 3];
 
 /// Surfaces without fewer unfit patches than the best before them, after which that one is kept.
 const PATIENCE: usize = 4;
-/// Part of the faces that may have to be split, and number of them in any case: where more are, it
+/// Part of the faces that may have to be edited, and number of them in any case: where more are, it
 /// is more faces that are wanted, not other ones.
-const MOST_SPLIT: f64 = 0.02;
-const FEW_SPLIT: usize = 4;
+const MOST_EDITED: f64 = 0.02;
+const FEW_EDITED: usize = 4;
 /// Principal curvature, of the larger one and 1/diagonal, that is rounding.
 const NO_CURVATURE: f64 = 1e-9;
 /// Part of the vertices in planes, cylinders and cones from which on those are parts of the surface:
@@ -46,8 +48,8 @@ pub(crate) struct Unfit {
 /// What is done about unfit patches.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Remedies {
-    /// Faces that are split, list after list.
-    splits: Vec<Vec<Place>>,
+    /// Faces that are split or, as needles, merged away, list after list.
+    edits: Vec<Vec<Place>>,
     /// Faces whose sides keep the curves of the paper.
     paper_faces: Vec<Place>,
 }
@@ -63,14 +65,14 @@ impl Remedies {
             let middles = |faces: Vec<&Unfit>| faces.into_iter().map(|face| face.middle).collect();
             let (new, others): (Vec<Place>, Vec<Place>) = (middles(new), middles(others));
             remedies.paper_faces.extend(new);
-            remedies.splits.push(others);
+            remedies.edits.push(others);
         }
         remedies
     }
 
     /// Adds them to what the user asks for.
     pub(crate) fn put_into(self, params: &mut StageParams) {
-        params.adapt.splits.extend(self.splits.into_iter().filter(|faces| !faces.is_empty()));
+        params.adapt.unfit_faces.extend(self.edits.into_iter().filter(|faces| !faces.is_empty()));
         params.network.paper_faces.extend(self.paper_faces);
     }
 }
@@ -89,11 +91,11 @@ impl Mending {
             return false;
         }
         let n_made = self.0.len();
-        let limit = ((MOST_SPLIT * f64::from(faces)) as usize).max(FEW_SPLIT);
+        let limit = ((MOST_EDITED * f64::from(faces)) as usize).max(FEW_EDITED);
         self.0[self.n_kept()].is_empty()
             || n_made > most as usize
             || n_made > self.n_kept() + PATIENCE
-            || self.tried().splits.last().is_some_and(|split| split.len() > limit)
+            || self.tried().edits.last().is_some_and(|faces| faces.len() > limit)
     }
 
     /// The first surface and at most `most` further ones: what a search of that length knows.
@@ -128,27 +130,29 @@ impl Mending {
     }
 }
 
-/// Whether surfaces are mended at all: of relaxed patches, over a base mesh that may be improved.
+/// Whether surfaces are mended at all: over a base mesh that may be improved.
 pub(crate) fn applies(params: &StageParams, is_imported: bool) -> bool {
-    let may_improve = match params.adapt.improve {
+    match params.adapt.improve {
         Improve::Auto => !is_imported,
         Improve::Always => true,
         Improve::Never => false,
-    };
-    may_improve && params.network.method == Method::Normal
+    }
 }
 
-/// The faces whose patches fold or lie beyond `tolerance`, relative to the diagonal.
+/// The faces whose patches fold or lie beyond `tolerance`, relative to the diagonal; without one
+/// beyond what a check allows.
 pub(crate) fn unfit(
     surface: &Surface<'_>,
     field: &dyn Field,
     tolerance: Option<f64>,
+    method: Method,
     threads: usize,
 ) -> Vec<Unfit> {
     let threads = Threads::new(threads);
-    let limit = tolerance.map_or(f64::INFINITY, |tolerance| tolerance * surface.diagonal());
+    let limit = tolerance.unwrap_or(DEFAULT_ERROR) * surface.diagonal();
     let found = unfit_faces(surface, field, limit, &|n, body| threads.for_each(n, body));
-    let has_developable = !found.is_empty() && has_developable_parts(surface, field);
+    let may_have_other_curves = method == Method::Normal && !found.is_empty();
+    let has_developable = may_have_other_curves && has_developable_parts(surface, field);
     let unfit = found.into_iter().map(|found| {
         let [a, b, c] =
             surface.faces()[found.face as usize].map(|v| surface.vertices()[v as usize]);
@@ -198,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_search_ends_with_its_rounds_its_patience_or_too_many_faces_to_split() {
+    fn the_search_ends_with_its_rounds_its_patience_or_too_many_faces_to_edit() {
         assert!(after(&[3]).is_over(0, 1000) && !after(&[3]).is_over(1, 1000));
         assert!(!after(&[4, 7, 5, 4]).is_over(6, 1000));
         assert!(after(&[4, 7, 5, 4, 4]).is_over(6, 1000));
@@ -210,11 +214,11 @@ mod tests {
     }
 
     #[test]
-    fn beside_flat_parts_faces_get_curves_of_the_paper_first_and_are_split_next() {
+    fn beside_flat_parts_faces_get_curves_of_the_paper_first_and_are_edited_next() {
         let (flat, other) = (face(1, true), face(2, false));
         let remedies = Remedies::of(&[vec![flat, other], vec![flat, face(3, true)]]);
         assert_eq!(remedies.paper_faces, [flat.middle, face(3, true).middle]);
-        assert_eq!(remedies.splits, [[other.middle], [flat.middle]]);
+        assert_eq!(remedies.edits, [[other.middle], [flat.middle]]);
     }
 
     #[test]

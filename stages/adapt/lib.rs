@@ -18,8 +18,8 @@ pub mod order;
 mod params;
 mod quartic;
 mod repair;
-mod splits;
 mod surface_mesh;
+mod unfit_faces;
 mod vertex;
 
 pub use error::AdaptError;
@@ -27,6 +27,7 @@ pub use params::{AdaptParams, Curves, Improve, Vertices};
 
 use curve_error::Measure;
 use error_cache::ErrorCache;
+use gate::Gate;
 use isospline_artifact::kinds::{BaseMesh, MeshView, TopologyProof};
 use isospline_geometry::TriangleMesh;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
@@ -40,7 +41,7 @@ pub struct Adapt {
 
 impl Stage for Adapt {
     const NAME: &'static str = "adapt";
-    const VERSION: u32 = 8;
+    const VERSION: u32 = 9;
     type Params = AdaptParams;
     type Whole<'a> = (MeshView<'a>,);
     type Rows<'a> = ();
@@ -110,8 +111,8 @@ impl Adapt {
             self.improve_normal(ctx, &mut surface, n_faces, counters)?;
         }
         let mut cache = ErrorCache::default();
-        for middles in &self.params.splits {
-            splits::split_faces(&mut surface, middles, counters);
+        for middles in &self.params.unfit_faces {
+            unfit_faces::edit(&mut surface, &Gate::new(&self.params), middles, counters);
             improve::trim(&mut surface, goal, &mut cache, counters);
         }
         counters.count("slivers_left", surface.slivers(self.params.min_quality));

@@ -59,9 +59,10 @@ pub struct AdaptParams {
     pub curves: Curves,
     /// Rounds of improvement for curves of normal distance, after the others, 0 to 1000.
     pub normal_rounds: u32,
-    /// Middles of faces, model units, that are split across their longest side when all else is
-    /// done, list after list; a middle that no face has is left out.
-    pub splits: Vec<Vec<[f64; 3]>>,
+    /// Middles of faces, model units, that are edited when all else is done, list after list: split
+    /// across their longest side or, where one side is very short, merged away. A middle that no
+    /// face has is left out.
+    pub unfit_faces: Vec<Vec<[f64; 3]>>,
     /// Whether vertices stay on the surface.
     pub vertices: Vertices,
 }
@@ -77,7 +78,7 @@ impl Default for AdaptParams {
             improve_rounds: 8,
             curves: Curves::Normal,
             normal_rounds: 12,
-            splits: Vec::new(),
+            unfit_faces: Vec::new(),
             vertices: Vertices::OnSurface,
         }
     }

@@ -18,7 +18,7 @@ const WORDS: [(&str, &[&str]); 11] = [
     ("target.fit", &["full"]),
     ("adapt.improve", &["never"]),
     ("adapt.curves", &["normal"]),
-    ("adapt.splits", &["[[[0.0, 0.0, 1.0]]]"]),
+    ("adapt.unfit_faces", &["[[[0.0, 0.0, 1.0]]]"]),
     ("adapt.vertices", &["free"]),
     ("network.method", &["paper"]),
     ("network.paper_faces", &["[[0.0, 0.0, 1.0]]"]),

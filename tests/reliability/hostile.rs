@@ -27,9 +27,6 @@ pub(crate) enum Expected {
     Exit(i32, &'static [&'static str]),
     /// Either: both are right, and which one comes depends on rounding.
     PassesOrExit(i32, &'static [&'static str]),
-    /// An exit code that is honest, while time, memory or the result fall short in a way that is
-    /// known; the board counts it apart.
-    Known(i32, &'static str),
 }
 
 /// A model file and what must come of it.
@@ -51,23 +48,16 @@ pub(crate) struct System {
 pub(super) fn try_all(scale: Scale, tally: &mut Tally) {
     let (mut longest, mut largest) = ((0.0, ""), (0.0, ""));
     let texts: Vec<Case> = fields().into_iter().chain(files()).collect();
-    // Whole surfaces take longest; every third does for a test, and what falls short is known.
+    // Whole surfaces take longest; every third does for a test.
     let kept = |(n, case): &(usize, &Case)| match case.expected {
-        Expected::Known(..) => scale == Scale::Full,
         Expected::Passes => scale == Scale::Full || n % 3 == 0,
         _ => true,
     };
     for (_, case) in texts.iter().enumerate().filter(kept) {
-        let ran = run(&case.model, case.expected);
+        let ran = run(&case.model);
         longest = max(longest, (ran.seconds.min(ran.processor_seconds), case.name));
         largest = max(largest, (ran.peak_mb, case.name));
-        let judged = judged(&ran, case.expected, scale);
-        match case.expected {
-            Expected::Known(code, what) if ran.outcome.code == code => {
-                tally.known(case.name, what);
-            }
-            _ => tally.case(case.name, judged),
-        }
+        tally.case(case.name, judged(&ran, case.expected, scale));
     }
     let unmountable = Mount::missing();
     for system in &SYSTEMS {
@@ -85,7 +75,7 @@ fn max<'a>(a: (f64, &'a str), b: (f64, &'a str)) -> (f64, &'a str) {
     if b.0 > a.0 { b } else { a }
 }
 
-fn run(model: &[u8], expected: Expected) -> Ran {
+fn run(model: &[u8]) -> Ran {
     let sandbox = Sandbox::new();
     for (name, text) in MESHES {
         sandbox.write(name, text);
@@ -93,12 +83,7 @@ fn run(model: &[u8], expected: Expected) -> Ran {
     sandbox.write("triakis.obj", triakis_icosahedron());
     sandbox.write("globe.obj", globe(12, 7));
     sandbox.write("model.toml", model);
-    let folder = sandbox.path("");
-    let mut command = match expected {
-        // How much it takes is the matter.
-        Expected::Known(..) => unlimited(&folder),
-        _ => limited(&folder),
-    };
+    let mut command = limited(&sandbox.path(""));
     command.args(["run", "model.toml", "--out", "out", "--no-sync"]);
     watched(&mut command, Duration::from_mins(2))
 }
@@ -117,12 +102,6 @@ pub(crate) fn limited(folder: &Path) -> Command {
     command
 }
 
-fn unlimited(folder: &Path) -> Command {
-    let mut command = Command::new(crate::program());
-    command.current_dir(folder).env("NO_COLOR", "1");
-    command
-}
-
 fn judged(ran: &Ran, expected: Expected, scale: Scale) -> Result<(), String> {
     let said = flat(&ran.outcome.stderr);
     let is = |code: i32, words: &[&str]| {
@@ -132,7 +111,6 @@ fn judged(ran: &Ran, expected: Expected, scale: Scale) -> Result<(), String> {
         Expected::Passes => is(0, &[]),
         Expected::Exit(code, words) => is(code, words),
         Expected::PassesOrExit(code, words) => is(0, &[]) || is(code, words),
-        Expected::Known(code, _) => is(0, &[]) || (code > 1 && is(code, &[])),
     };
     // On a busy machine the wall clock tells of others.
     let seconds = ran.seconds.min(ran.processor_seconds);

@@ -12,20 +12,12 @@ pub struct Tally {
     cases: usize,
     failures: Vec<String>,
     skips: Vec<String>,
-    known: Vec<String>,
     figures: Vec<String>,
 }
 
 impl Tally {
     pub(crate) fn new(id: &'static str) -> Self {
-        Self {
-            id,
-            cases: 0,
-            failures: Vec::new(),
-            skips: Vec::new(),
-            known: Vec::new(),
-            figures: Vec::new(),
-        }
+        Self { id, cases: 0, failures: Vec::new(), skips: Vec::new(), figures: Vec::new() }
     }
 
     /// Counts a case; what went wrong is told at once, for a row may take long.
@@ -43,12 +35,6 @@ impl Tally {
     /// Counts cases that passed, where there are too many to name.
     pub(crate) fn passed(&mut self, cases: usize) {
         self.cases += cases;
-    }
-
-    /// Counts a case that does not pass in a way that is known; the board tells it.
-    pub(crate) fn known(&mut self, name: impl Display, what: &str) {
-        self.cases += 1;
-        self.known.push(format!("known: {name}: {what}"));
     }
 
     /// Notes that something could not be tried here, and why: "not root".
@@ -73,16 +59,14 @@ impl Tally {
 
     /// The line of the board.
     pub fn line(&self, property: &str) -> String {
-        let passed = self.cases - self.failures.len() - self.known.len();
+        let passed = self.cases - self.failures.len();
         let verdict = match (self.failures.is_empty(), self.cases, self.skips.is_empty()) {
             (false, ..) => "FAIL",
             (true, 0, _) => "skipped",
             (true, _, false) => "pass*",
-            (true, _, true) if !self.known.is_empty() => "known",
             (true, _, true) => "pass",
         };
-        let notes: Vec<&str> =
-            self.figures.iter().chain(&self.known).chain(&self.skips).map(String::as_str).collect();
+        let notes: Vec<&str> = self.figures.iter().chain(&self.skips).map(String::as_str).collect();
         let (id, cases) = (self.id, self.cases);
         format!("{id:<4} {property:<14} {cases:>8} {passed:>8}  {verdict:<8} {}", notes.join("; "))
     }

@@ -82,7 +82,8 @@ impl ModelFolder {
             |_| Vec::new(),
             |surface| {
                 let tolerance = self.model.file.target.tolerance(surface.diagonal());
-                unfit(&surface, &self.model.field, tolerance, threads)
+                let method = self.model.file.stages.network.method;
+                unfit(&surface, &self.model.field, tolerance, method, threads)
             },
         ))
     }
