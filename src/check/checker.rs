@@ -1,14 +1,17 @@
 //! The whole check, figure by figure.
 
-use crate::continuity::{self, Continuity};
-use crate::curvature::{self, CurvatureJump};
-use crate::distance::{self, Distance, first_order};
-use crate::lent_threads::{ForEach, map};
+use crate::curvature;
+use crate::distance::{GRID, first_order};
+use crate::edges::{self, Edges};
+use crate::faces::{self, Faces, count_not_finite};
+use crate::grid::Grid;
+use crate::lent_threads::{ForEach, blocks, blocks_beside};
 use crate::params::{CheckParams, Expected};
+use crate::percentile::percentile;
 use crate::report::{CheckReport, Place, worse};
-use crate::sector::{self, Weights};
 use crate::surface::Surface;
 use crate::topology::Topology;
+use crate::volume::{self, Quadrature};
 use crate::{foot, quality, verdict};
 use isospline_geometry::Vec3;
 use isospline_implicit::{Field, Jet1};
@@ -50,43 +53,51 @@ pub fn check(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
 
 fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
     let Job { surface, field, .. } = *job;
-    let topology = Topology::of(surface);
     let at_vertices = vertex_jets(surface, field, for_each);
-    let normals: Vec<Vec3> = at_vertices.iter().map(|jet| jet.gradient).collect();
-    let distance = distance::measure(surface, field, for_each);
-    let parts = Parts {
-        continuity: continuity::measure(surface, &topology, for_each),
-        curvature: curvature::measure(surface, &topology, for_each),
-        worst: foot::largest(surface, field, &distance),
-        weights: sector::measure(surface, &topology, &normals),
-        off_surface: at_vertices.iter().fold(0.0, |acc, jet| worse(acc, first_order(jet))),
-        not_finite: count_not_finite(surface)
-            + distance.not_finite
-            + at_vertices.iter().filter(|jet| !first_order(jet).is_finite()).count() as u64,
-        distance,
-        topology,
-    };
-    parts.report(job)
+    let (grid, quadrature) = (&Grid::new(GRID), &Quadrature::new());
+    let gauge = faces::Gauge { surface, field, grid, quadrature };
+    let (mut topology, blocks) = blocks_beside(
+        for_each,
+        || Topology::of(surface),
+        surface.faces().len(),
+        |range| gauge.measure(range),
+    );
+    let mut faces = Faces::default();
+    blocks.into_iter().for_each(|block| faces.append(block));
+    topology.enter_volumes(|faces_of| volume::enclosed(surface, faces_of, &faces.moments));
+    let gauge = edges::Gauge::new(surface, &at_vertices);
+    let (worst, blocks) = blocks_beside(
+        for_each,
+        || foot::largest(surface, field, &faces.distances.faces, grid),
+        topology.joints.len(),
+        |range| gauge.measure(&topology.joints[range]),
+    );
+    let mut edges = Edges::default();
+    blocks.into_iter().for_each(|block| edges.append(block));
+    Parts { topology, faces, edges, worst, at_vertices, grid }.report(job)
 }
 
 /// What the parts of the check found, in model units.
-struct Parts {
+struct Parts<'a> {
     topology: Topology,
-    continuity: Continuity,
-    curvature: CurvatureJump,
-    distance: Distance,
+    faces: Faces,
+    edges: Edges,
     worst: Option<(f64, Place)>,
-    weights: Weights,
-    /// Largest first-order distance of a vertex.
-    off_surface: f64,
-    not_finite: u64,
+    at_vertices: Vec<Jet1>,
+    grid: &'a Grid,
 }
 
-impl Parts {
+impl Parts<'_> {
     /// The figures, relative where the report wants them so; no verdict yet.
-    fn report(self, job: &Job<'_>) -> CheckReport {
-        let Self { topology, continuity, curvature, distance, worst, weights, .. } = self;
+    fn report(mut self, job: &Job<'_>) -> CheckReport {
+        let not_finite = self.not_finite(job.surface);
+        let off_surface = self.at_vertices.iter().map(first_order).fold(0.0, worse);
+        let Self { topology, faces, worst, .. } = self;
+        let Edges { continuity, jumps, weights } = &mut self.edges;
+        let distances = faces.distances;
         let surface = job.surface;
+        let distance = distances.summary(surface, self.grid);
+        let curvature = curvature::percentiles(jumps);
         let diagonal = surface.diagonal();
         CheckReport {
             faces: surface.faces().len() as u64,
@@ -97,10 +108,10 @@ impl Parts {
             edge_defects: topology.defects,
             component_list: topology.components,
             diagonal,
-            gap_max: continuity.gap / diagonal,
-            shared_bits_differ: continuity.bits_differ,
-            g1_angle_deg_max: continuity.angle_deg_max,
-            g1_angle_deg_p99: continuity.angle_deg_p99,
+            gap_max: worse(faces.corners.gap, continuity.gap) / diagonal,
+            shared_bits_differ: faces.corners.bits_differ + continuity.bits_differ,
+            g1_angle_deg_max: continuity.angle_deg_max(),
+            g1_angle_deg_p99: percentile(&mut continuity.angles_deg, 99),
             curvature_jump_median: curvature.median,
             curvature_jump_p99: curvature.p99,
             rel_error_max: worst.map_or(f64::NAN, |(d, _)| d / diagonal),
@@ -109,37 +120,38 @@ impl Parts {
             rel_error_mean: distance.mean / diagonal,
             normal_error_deg_max: distance.normal_deg_max,
             flipped_patches: distance.flipped,
-            degenerate_normals: distance.degenerate + continuity.degenerate_normals,
-            vertex_error_max: worse(self.off_surface, continuity.corner_gap) / diagonal,
+            degenerate_normals: distances.degenerate + continuity.degenerate_normals,
+            vertex_error_max: worse(off_surface, faces.corners.gap) / diagonal,
             lambda0_out_of_range: weights.out_of_range,
             lambda0_min: weights.min,
             lambda0_max: weights.max,
             quality_min: quality::least(surface),
-            not_finite: self.not_finite,
+            not_finite,
             repairs: job.repairs.clone(),
             worst_error: worst.map(|(d, place)| Place { value: d / diagonal, ..place }),
-            worst_g1_angle: continuity.worst_angle,
+            worst_g1_angle: continuity.worst_angle(surface),
             worst_normal: distance.worst_normal,
             pass: false,
             failures: Vec::new(),
         }
     }
+
+    fn not_finite(&self, surface: &Surface<'_>) -> u64 {
+        let at_vertices = self.at_vertices.iter().filter(|jet| !first_order(jet).is_finite());
+        count_not_finite(surface.vertices())
+            + self.faces.not_finite
+            + self.faces.distances.not_finite
+            + at_vertices.count() as u64
+    }
 }
 
 /// Field and gradient at every vertex.
 fn vertex_jets(surface: &Surface<'_>, field: &dyn Field, for_each: ForEach<'_>) -> Vec<Jet1> {
-    map(for_each, surface.vertices().len(), |range| {
+    let blocks = blocks(for_each, surface.vertices().len(), |range| {
         let points = &surface.vertices()[range];
         let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
         field.gradients(points, &mut jets);
         jets
-    })
-}
-
-/// Vertices and control points with a coordinate that is not a finite number.
-fn count_not_finite(surface: &Surface<'_>) -> u64 {
-    let lost =
-        |points: &[Vec3]| points.iter().filter(|p| !p.iter().all(|x| x.is_finite())).count() as u64;
-    let in_nets = (0..surface.faces().len()).map(|f| lost(&surface.net(f)));
-    lost(surface.vertices()) + in_nets.sum::<u64>()
+    });
+    blocks.concat()
 }

@@ -1,230 +1,190 @@
 //! Gaps and angles between patches along their shared edges.
+#![expect(clippy::inline_always, reason = "kernels must be compiled for the widest vectors whole")]
 
-use crate::lent_threads::{ForEach, map};
+use crate::distance::place;
+use crate::evaluate::Stencil;
+use crate::lanes::{LANES, Lane, Triple, dot, minus, normal, vector};
 use crate::report::{Place, worse};
+use crate::seam::{Derivatives, N_EDGE_POINTS, N_SAMPLES, Seam, parameter};
+use crate::slope::{Slope, Slopes, Steepest};
 use crate::surface::Surface;
-use crate::topology::{Joint, Topology};
-use isospline_geometry::bezier_triangle::{DEGREE, boundary_index, first_inner_index};
-use isospline_geometry::{HalfEdge, Vec3};
+use isospline_geometry::HalfEdge;
+use isospline_geometry::bezier_triangle::DEGREE;
 
-/// What the shared edges show; gaps in model units.
-#[derive(Debug)]
+/// What shared edges show; gaps in model units.
+#[derive(Debug, Default)]
 pub(crate) struct Continuity {
     pub(crate) gap: f64,
-    /// Part of `gap`: net corners against vertices.
-    pub(crate) corner_gap: f64,
+    /// Edges whose control points differ in some bit.
     pub(crate) bits_differ: u64,
-    pub(crate) angle_deg_max: f64,
-    pub(crate) angle_deg_p99: f64,
-    pub(crate) worst_angle: Option<Place>,
+    /// Points at which the two normals are not both there.
     pub(crate) degenerate_normals: u64,
+    /// Largest angle between the normals of the two patches, by edge.
+    pub(crate) angles_deg: Vec<f64>,
+    worst: Option<Worst>,
 }
 
-/// Points an edge at which normals are compared, ends included: `t = i / 32` and `1 - t` are
-/// exact, so both patches are evaluated at the same parameter.
-const N_EDGE_POINTS: usize = 33;
-
-pub(crate) fn measure(
-    surface: &Surface<'_>,
-    topology: &Topology,
-    for_each: ForEach<'_>,
-) -> Continuity {
-    let table = bernstein_table();
-    let joints = &topology.joints;
-    let edges = map(for_each, joints.len(), |range| {
-        joints[range].iter().map(|&joint| EdgeFigures::of(surface, joint, &table)).collect()
-    });
-    let mut out = corners(surface);
-    for edge in &edges {
-        out.gap = worse(out.gap, edge.gap);
-        out.bits_differ += u64::from(edge.bits_differ);
-        out.degenerate_normals += edge.degenerate;
-        if out.worst_angle.is_none() || edge.angle_deg > out.angle_deg_max {
-            out.worst_angle = Some(edge.place());
-        }
-        out.angle_deg_max = worse(out.angle_deg_max, edge.angle_deg);
-    }
-    out.angle_deg_p99 = percentile_99(edges.iter().map(|e| e.angle_deg).collect());
-    out
-}
-
-/// Net corners against vertices.
-fn corners(surface: &Surface<'_>) -> Continuity {
-    let (mut gap, mut bits_differ) = (0.0, 0);
-    for (f, face) in surface.faces().iter().enumerate() {
-        let net = surface.net(f);
-        for (corner, &v) in face.iter().enumerate() {
-            let (p, q) = (net[boundary_index(DEGREE, corner, 0)], surface.vertices()[v as usize]);
-            gap = worse(gap, (p - q).norm());
-            bits_differ += u64::from(!same_bits(&p, &q));
-        }
-    }
-    Continuity {
-        gap,
-        corner_gap: gap,
-        bits_differ,
-        angle_deg_max: 0.0,
-        angle_deg_p99: 0.0,
-        worst_angle: None,
-        degenerate_normals: 0,
-    }
-}
-
+/// The largest angle of all: of which edge, as its left patch has it, at which point.
 #[derive(Clone, Copy, Debug)]
-struct EdgeFigures {
-    left: HalfEdge,
-    gap: f64,
-    bits_differ: bool,
+struct Worst {
     angle_deg: f64,
-    /// Place of the largest angle on the edge: index of its parameter and point.
-    worst: (usize, Vec3),
-    degenerate: u64,
+    left: HalfEdge,
+    point: usize,
 }
 
-impl EdgeFigures {
-    fn of(surface: &Surface<'_>, joint: Joint, table: &[[f64; DEGREE]]) -> Self {
-        let left = EdgeRows::of(surface, joint.left);
-        let right = EdgeRows::of(surface, joint.right);
-        let mut out = Self {
-            left: joint.left,
-            gap: 0.0,
-            bits_differ: false,
-            angle_deg: 0.0,
-            worst: (0, left.boundary[0]),
-            degenerate: 0,
-        };
-        for s in 0..=DEGREE {
-            let (p, q) = (left.boundary[s], right.boundary[DEGREE - s]);
-            out.gap = worse(out.gap, (p - q).norm());
-            out.bits_differ |= !same_bits(&p, &q);
+/// Angles between the normals of both sides at all points of eight edges; half a turn, and a one,
+/// where not both exist.
+pub(crate) struct Angles {
+    slopes: Slopes<N_SAMPLES>,
+    degenerate: [f64; N_SAMPLES],
+}
+
+/// What eight edges show, each in its lane.
+pub(crate) struct Eight {
+    gap_sq: Lane,
+    bits_differ: [bool; LANES],
+    steepest: Steepest,
+    degenerate: Lane,
+}
+
+impl Continuity {
+    /// Takes in edges one after another, 8 at most, given by their half-edges on the left.
+    pub(crate) fn enter(&mut self, eight: &Eight, left: impl Iterator<Item = HalfEdge>) {
+        for (k, left) in left.enumerate() {
+            self.gap = worse(self.gap, eight.gap_sq[k].sqrt());
+            self.bits_differ += u64::from(eight.bits_differ[k]);
+            self.degenerate_normals += eight.degenerate[k] as u64;
+            let angle_deg = eight.steepest.of(k).angle_deg();
+            self.angles_deg.push(angle_deg);
+            self.enter_worst(Worst { angle_deg, left, point: eight.steepest.at(k) });
         }
-        for i in 0..N_EDGE_POINTS {
-            let normals = [left.normal(&table[i]), right.normal(&table[N_EDGE_POINTS - 1 - i])];
-            let angle = angle_deg(normals, &mut out.degenerate);
-            if angle > out.angle_deg || angle.is_nan() {
-                out.worst = (i, left.point(&table[i], i));
+    }
+
+    /// Takes in the edges that follow.
+    pub(crate) fn append(&mut self, other: Self) {
+        self.gap = worse(self.gap, other.gap);
+        self.bits_differ += other.bits_differ;
+        self.degenerate_normals += other.degenerate_normals;
+        self.angles_deg.extend(other.angles_deg);
+        if let Some(worst) = other.worst {
+            self.enter_worst(worst);
+        }
+    }
+
+    fn enter_worst(&mut self, new: Worst) {
+        let outranks = |old: Worst| !(old.angle_deg.is_nan() || new.angle_deg <= old.angle_deg);
+        if self.worst.is_none_or(outranks) {
+            self.worst = Some(new);
+        }
+    }
+
+    /// The largest angle; 0 without edges.
+    pub(crate) fn angle_deg_max(&self) -> f64 {
+        self.worst.map_or(0.0, |worst| worst.angle_deg)
+    }
+
+    /// Place of the largest angle.
+    pub(crate) fn worst_angle(&self, surface: &Surface<'_>) -> Option<Place> {
+        let Worst { angle_deg, left, point } = self.worst?;
+        let (corner, t) = (left.corner() as usize, parameter(point));
+        let mut at = [0.0; 3];
+        (at[corner], at[(corner + 1) % 3]) = (1.0 - t, t);
+        Some(place(surface, left.face() as usize, &Stencil::new(at), angle_deg))
+    }
+}
+
+impl Eight {
+    /// Measures a seam whose angles are known.
+    #[inline(always)]
+    pub(crate) fn of(seam: &Seam, angles: &Angles) -> Self {
+        let (mut gap_sq, mut bits_differ) = ([0.0; LANES], [false; LANES]);
+        for s in 0..=DEGREE {
+            let (p, q) = (seam.left.boundary(s), seam.right.boundary(DEGREE - s));
+            let apart = minus(p, q);
+            for k in 0..LANES {
+                gap_sq[k] = worse(gap_sq[k], dot(vector(&apart, k), vector(&apart, k)));
+                bits_differ[k] |= !same_bits(p, q, k);
             }
-            out.angle_deg = worse(out.angle_deg, angle);
+        }
+        let Angles { slopes, degenerate } = angles;
+        let mut out =
+            Self { gap_sq, bits_differ, steepest: Steepest::NONE, degenerate: [0.0; LANES] };
+        for point in 0..N_EDGE_POINTS {
+            let first = LANES * point;
+            out.steepest.enter(point, slopes, first);
+            for k in 0..LANES {
+                out.degenerate[k] += degenerate[first + k];
+            }
         }
         out
     }
+}
 
-    fn place(&self) -> Place {
-        let t = parameter(self.worst.0);
-        let corner = self.left.corner() as usize;
-        let mut barycentric = [0.0; 3];
-        barycentric[corner] = 1.0 - t;
-        barycentric[(corner + 1) % 3] = t;
-        let (face, point) = (self.left.face(), self.worst.1.into());
-        Place { face, barycentric, point, value: self.angle_deg }
+impl Angles {
+    pub(crate) fn new() -> Self {
+        Self { slopes: Slopes::new(), degenerate: [0.0; N_SAMPLES] }
     }
-}
 
-/// Boundary and first inner row of a net along a half-edge, in its direction.
-struct EdgeRows {
-    boundary: [Vec3; DEGREE + 1],
-    inner: [Vec3; DEGREE],
-}
-
-impl EdgeRows {
-    fn of(surface: &Surface<'_>, h: HalfEdge) -> Self {
-        let net = surface.net(h.face() as usize);
-        let corner = h.corner() as usize;
-        Self {
-            boundary: std::array::from_fn(|s| net[boundary_index(DEGREE, corner, s)]),
-            inner: std::array::from_fn(|s| net[first_inner_index(DEGREE, corner, s)]),
+    /// Become those between two sides.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, [left, right]: &[Derivatives; 2]) {
+        for i in 0..N_SAMPLES {
+            let (a, a_exists) = normal(vector(&left.along, i), vector(&left.inward, i));
+            let (b, b_exists) = normal(vector(&right.along, i), vector(&right.inward, i));
+            let slope = Slope::between(a, b);
+            let both_exist = a_exists & b_exists;
+            self.slopes.set(i, if both_exist { slope } else { Slope::HALF_TURN });
+            self.degenerate[i] = if both_exist { 0.0 } else { 1.0 };
         }
     }
-
-    /// Oriented normal, unnormalised; `None` where the derivatives do not span a plane.
-    ///
-    /// Differences are formed before they are weighed: the angle then keeps its digits on edges
-    /// that are short against their distance from the origin.
-    fn normal(&self, weights: &[f64; DEGREE]) -> Option<Vec3> {
-        let (mut along, mut across) = (Vec3::zeros(), Vec3::zeros());
-        for s in 0..DEGREE {
-            along += weights[s] * (self.boundary[s + 1] - self.boundary[s]);
-            across += weights[s] * (self.inner[s] - self.boundary[s]);
-        }
-        let normal = along.cross(&across);
-        // Below a sine of 1e-10 half of the digits of the normal are rounding.
-        let floor_sq = 1e-20 * along.norm_squared() * across.norm_squared();
-        (normal.norm_squared() > floor_sq).then_some(normal)
-    }
-
-    fn point(&self, weights: &[f64; DEGREE], i: usize) -> Vec3 {
-        let t = parameter(i);
-        (0..DEGREE).fold(Vec3::zeros(), |acc, s| {
-            acc + weights[s] * ((1.0 - t) * self.boundary[s] + t * self.boundary[s + 1])
-        })
-    }
 }
 
-/// Angle between two normals; half a turn, and counted, where one does not exist.
-fn angle_deg([a, b]: [Option<Vec3>; 2], degenerate: &mut u64) -> f64 {
-    if let (Some(a), Some(b)) = (a, b) {
-        return libm::atan2(a.cross(&b).norm(), a.dot(&b)).to_degrees();
-    }
-    *degenerate += 1;
-    180.0
-}
-
-fn same_bits(p: &Vec3, q: &Vec3) -> bool {
-    (0..3).all(|k| p[k].to_bits() == q[k].to_bits())
-}
-
-fn parameter(i: usize) -> f64 {
-    i as f64 / (N_EDGE_POINTS - 1) as f64
-}
-
-/// Bernstein polynomials of degree 6 at the edge points.
-fn bernstein_table() -> Vec<[f64; DEGREE]> {
-    const BINOMIAL: [f64; DEGREE] = [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0];
-    (0..N_EDGE_POINTS)
-        .map(|i| {
-            let t = parameter(i);
-            let power = |x: f64, n: usize| (0..n).fold(1.0, |acc, _| acc * x);
-            std::array::from_fn(|s| BINOMIAL[s] * power(t, s) * power(1.0 - t, DEGREE - 1 - s))
-        })
-        .collect()
-}
-
-/// The value that 99 % of `values` do not exceed; not-a-number if one of them is, or if none is
-/// given.
-fn percentile_99(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() || values.iter().any(|x| x.is_nan()) {
-        return f64::NAN;
-    }
-    values.sort_unstable_by(f64::total_cmp);
-    values[(values.len() * 99).div_ceil(100) - 1]
+#[inline(always)]
+fn same_bits(p: &Triple, q: &Triple, k: usize) -> bool {
+    (0..3).all(|c| p[c][k].to_bits() == q[c][k].to_bits())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Derivatives the same at all points of all edges.
+    fn constant(along: [f64; 3], inward: [f64; 3]) -> Derivatives {
+        let spread = |v: [f64; 3]| v.map(|x| [x; N_SAMPLES]);
+        Derivatives { along: spread(along), inward: spread(inward) }
+    }
+
+    fn angles(left: Derivatives, right: Derivatives) -> Angles {
+        let mut angles = Angles::new();
+        angles.set(&[left, right]);
+        angles
+    }
+
     #[test]
-    fn a_known_dihedral_angle_is_measured_to_rounding() {
+    fn a_known_dihedral_angle_is_measured_at_every_point() {
+        let left = || constant([1.0, 0.0, 0.0], [0.0, 2.0, 0.0]);
         for angle in [1e-9, 1e-3, 1.0, 90.0, 179.0] {
-            let turned = |a: f64| Vec3::new(0.0, libm::sin(a), libm::cos(a));
-            let found = angle_deg([Some(Vec3::z()), Some(turned(f64::to_radians(angle)))], &mut 0);
-            assert!((found - angle).abs() < 1e-13 * angle, "{found} {angle}");
+            let turn = f64::to_radians(angle);
+            let across = [0.0, -libm::cos(turn), -libm::sin(turn)];
+            let Angles { slopes, degenerate } = angles(left(), constant([-3.0, 0.0, 0.0], across));
+            assert!(degenerate.iter().sum::<f64>() < 0.5);
+            for i in 0..N_SAMPLES {
+                let found = slopes.get(i).angle_deg();
+                assert!((found - angle).abs() < 1e-13 * angle, "{found} {angle}");
+            }
         }
     }
 
     #[test]
     fn a_missing_normal_is_half_a_turn_and_counted() {
-        let mut n_degenerate = 0;
-        assert!(angle_deg([Some(Vec3::z()), None], &mut n_degenerate) > 179.0);
-        assert_eq!(n_degenerate, 1);
-    }
-
-    #[test]
-    fn the_percentile_leaves_one_in_a_hundred_above() {
-        let values: Vec<f64> = (1..=200).map(f64::from).collect();
-        assert!((percentile_99(values) - 198.0).abs() < 1e-15);
-        assert!((percentile_99(vec![3.0]) - 3.0).abs() < 1e-15);
-        assert!(percentile_99(vec![1.0, f64::NAN]).is_nan());
-        assert!(percentile_99(Vec::new()).is_nan());
+        let left = constant([1.0, 0.0, 0.0], [0.0, 2.0, 0.0]);
+        let mut right = constant([-1.0, 0.0, 0.0], [0.0, -2.0, 0.0]);
+        right.inward[1][40] = 0.0;
+        let Angles { slopes, degenerate } = angles(left, right);
+        for i in 0..N_SAMPLES {
+            let is_missing = i == 40;
+            assert_eq!(degenerate[i] > 0.5, is_missing);
+            assert_eq!(slopes.get(i).angle_deg() > 179.0, is_missing);
+        }
     }
 }

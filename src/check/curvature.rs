@@ -1,10 +1,12 @@
 //! Jump of the normal curvature across shared edges, from second derivatives of the patches.
+#![expect(clippy::inline_always, reason = "kernels must be compiled for the widest vectors whole")]
 
-use crate::lent_threads::{ForEach, map};
-use crate::surface::Surface;
-use crate::topology::{Joint, Topology};
-use isospline_geometry::bezier_triangle::{DEGREE, index};
-use isospline_geometry::{HalfEdge, Vec3};
+use crate::grid::bernstein;
+use crate::lanes::{LANES, Lane, cross, dot, minus, put, vector, weighed};
+use crate::percentile::percentile;
+use crate::report::worse;
+use crate::seam::{Derivatives, N_EDGE_POINTS, Seam, Side};
+use isospline_geometry::bezier_triangle::DEGREE;
 
 /// Percentiles over edges of their relative curvature jumps.
 #[derive(Clone, Copy, Debug)]
@@ -14,117 +16,151 @@ pub(crate) struct CurvatureJump {
 }
 
 /// Points an edge, ends included: `t = i / 8` and `1 - t` are exact.
-const N_EDGE_POINTS: usize = 9;
+const N_POINTS: usize = 9;
+/// One of them in so many of those at which normals are compared.
+const STEP: usize = (N_EDGE_POINTS - 1) / (N_POINTS - 1);
+/// Those of eight edges.
+const N_CURVATURES: usize = LANES * N_POINTS;
 /// Curvature, over the diagonal, below which a jump is not divided by it: planes have none.
-const FLAT_REL: f64 = 1e-3;
+pub(crate) const FLAT_REL: f64 = 1e-3;
 
-/// Measures every edge with two faces.
+/// Bernstein polynomials of degree 5 at the points of an edge.
+pub(crate) struct CurvatureTable([Weights; N_POINTS]);
+
+/// Those at one point.
+type Weights = [f64; DEGREE - 1];
+
+impl CurvatureTable {
+    pub(crate) fn new() -> Self {
+        Self(std::array::from_fn(|i| bernstein(i as f64 / (N_POINTS - 1) as f64)))
+    }
+}
+
+/// Second derivatives over 42 at all points of eight edges, those of a point beside each other.
+#[repr(C, align(64))]
+pub(crate) struct Second {
+    along_along: [[f64; N_CURVATURES]; 3],
+    along_inward: [[f64; N_CURVATURES]; 3],
+    inward_inward: [[f64; N_CURVATURES]; 3],
+}
+
+/// The relative jump of each of eight edges, from the derivatives on both sides.
 ///
 /// The normal curvature is taken along the direction normal to the edge in the tangent plane,
-/// from each side; an edge's figure is its largest jump over its largest curvature.
-pub(crate) fn measure(
-    surface: &Surface<'_>,
-    topology: &Topology,
-    for_each: ForEach<'_>,
-) -> CurvatureJump {
-    let joints = &topology.joints;
-    let flat = FLAT_REL / surface.diagonal();
-    let jumps = map(for_each, joints.len(), |range| {
-        joints[range].iter().map(|&joint| relative_jump(surface, joint, flat)).collect()
-    });
-    percentiles(jumps)
-}
-
-fn relative_jump(surface: &Surface<'_>, joint: Joint, flat: f64) -> f64 {
-    let (left, right) = (Rows::of(surface, joint.left), Rows::of(surface, joint.right));
-    let (mut jump, mut scale) = (0.0_f64, flat);
-    for i in 0..N_EDGE_POINTS {
-        let t = i as f64 / (N_EDGE_POINTS - 1) as f64;
-        let (a, b) = (left.curvature_across(t), right.curvature_across(1.0 - t));
-        if !(a.is_finite() && b.is_finite()) {
-            return f64::NAN;
-        }
-        jump = jump.max((a - b).abs());
-        scale = scale.max(a.abs()).max(b.abs());
-    }
-    jump / scale
-}
-
-/// First and second derivatives of a patch at a half-edge, as Bézier curves along it.
-struct Rows {
-    along: [Vec3; DEGREE],
-    inward: [Vec3; DEGREE],
-    along_along: [Vec3; DEGREE - 1],
-    along_inward: [Vec3; DEGREE - 1],
-    inward_inward: [Vec3; DEGREE - 1],
-}
-
-impl Rows {
-    fn of(surface: &Surface<'_>, h: HalfEdge) -> Self {
-        // symbols: n the degree; rows b of the net, the boundary first
-        let net = surface.net(h.face() as usize);
-        let b = |row: usize, s: usize| net[row_index(h.corner() as usize, row, s)];
-        let n = DEGREE as f64;
-        let m = n * (n - 1.0);
-        let along: [Vec3; DEGREE] = std::array::from_fn(|s| b(0, s + 1) - b(0, s));
-        let inward: [Vec3; DEGREE] = std::array::from_fn(|s| b(1, s) - b(0, s));
-        Self {
-            along: along.map(|d| n * d),
-            inward: inward.map(|d| n * d),
-            along_along: std::array::from_fn(|s| m * (along[s + 1] - along[s])),
-            along_inward: std::array::from_fn(|s| m * (inward[s + 1] - inward[s])),
-            inward_inward: std::array::from_fn(|s| m * (b(2, s) - b(1, s) - inward[s])),
+/// from each side; an edge's figure is its largest jump over its largest curvature, which counts as
+/// `flat` at least.
+#[inline(always)]
+pub(crate) fn relative_jumps(
+    [first_left, first_right]: &[Derivatives; 2],
+    [second_left, second_right]: &[Second; 2],
+    flat: f64,
+) -> Lane {
+    let (a, b) = (curvatures(first_left, second_left), curvatures(first_right, second_right));
+    let (mut jump, mut scale) = ([0.0; LANES], [flat; LANES]);
+    for (a, b) in a.iter().zip(&b) {
+        for k in 0..LANES {
+            jump[k] = worse(jump[k], (a[k] - b[k]).abs());
+            scale[k] = worse(worse(scale[k], a[k].abs()), b[k].abs());
         }
     }
+    // What is infinite becomes not-a-number here.
+    std::array::from_fn(|k| jump[k] / scale[k])
+}
 
-    /// Normal curvature at `t` of the half-edge along the direction normal to it.
-    fn curvature_across(&self, t: f64) -> f64 {
-        let (along, inward) = (at(t, self.along), at(t, self.inward));
-        let normal = along.cross(&inward).normalize();
-        let across = normal.cross(&along).normalize();
-        // across = x along + y inward
-        let y = 1.0 / inward.dot(&across);
-        let x = -y * inward.dot(&along) / along.norm_squared();
-        let form = |row: &[Vec3; DEGREE - 1]| at(t, *row).dot(&normal);
-        x * x * form(&self.along_along)
-            + 2.0 * x * y * form(&self.along_inward)
-            + y * y * form(&self.inward_inward)
+impl Second {
+    pub(crate) fn new() -> Self {
+        let zero = [[0.0; N_CURVATURES]; 3];
+        Self { along_along: zero, along_inward: zero, inward_inward: zero }
     }
-}
 
-/// Index of the control point `s` steps along the row `row` within the edge from `corner`.
-fn row_index(corner: usize, row: usize, s: usize) -> usize {
-    let mut e = [0; 3];
-    e[corner] = DEGREE - row - s;
-    e[(corner + 1) % 3] = s;
-    e[(corner + 2) % 3] = row;
-    index(e)
-}
+    /// Become those on both sides of a seam, the points in the order of the left one.
+    #[inline(always)]
+    pub(crate) fn set_both([left, right]: &mut [Self; 2], seam: &Seam, table: &CurvatureTable) {
+        let CurvatureTable(points) = table;
+        left.set(&seam.left, points.iter());
+        right.set(&seam.right, points.iter().rev());
+    }
 
-/// Point at `t` of the Bézier curve with these control points, by de Casteljau's algorithm.
-fn at<const N: usize>(t: f64, mut points: [Vec3; N]) -> Vec3 {
-    for n in (1..N).rev() {
-        for s in 0..n {
-            points[s] = (1.0 - t) * points[s] + t * points[s + 1];
+    #[inline(always)]
+    fn set<'a>(&mut self, side: &Side, points: impl Iterator<Item = &'a Weights>) {
+        let differences = second_differences(side);
+        for (i, weights) in points.enumerate() {
+            let sum = weighed(weights.iter().copied().zip(&differences));
+            for c in 0..3 {
+                self.along_along[c][LANES * i..][..LANES].copy_from_slice(&sum[c]);
+                self.along_inward[c][LANES * i..][..LANES].copy_from_slice(&sum[3 + c]);
+                self.inward_inward[c][LANES * i..][..LANES].copy_from_slice(&sum[6 + c]);
+            }
         }
     }
-    points[0]
 }
 
-fn percentiles(mut values: Vec<f64>) -> CurvatureJump {
-    if values.is_empty() || values.iter().any(|x| x.is_nan()) {
-        return CurvatureJump { median: f64::NAN, p99: f64::NAN };
+/// Second differences of the net: twice along the edge, along it and inward, twice inward.
+#[inline(always)]
+fn second_differences(side: &Side) -> [[Lane; 9]; DEGREE - 1] {
+    let mut out = [[[0.0; LANES]; 9]; DEGREE - 1];
+    for (s, out) in out.iter_mut().enumerate() {
+        let (along, inward) = (side.along(s), side.inward(s));
+        let parts = [
+            minus(&side.along(s + 1), &along),
+            minus(&side.inward(s + 1), &inward),
+            minus(&minus(side.second(s), side.inner(s)), &inward),
+        ];
+        put(parts, out);
     }
-    values.sort_unstable_by(f64::total_cmp);
-    let reached = |percent: usize| values[(values.len() * percent).div_ceil(100) - 1];
-    CurvatureJump { median: reached(50), p99: reached(99) }
+    out
+}
+
+/// Normal curvatures at all points along the direction normal to the edge.
+#[inline(always)]
+fn curvatures(first: &Derivatives, second: &Second) -> [Lane; N_POINTS] {
+    let mut out = [[0.0; LANES]; N_POINTS];
+    for (point, out) in out.iter_mut().enumerate() {
+        let (at, first_at) = (LANES * point, LANES * STEP * point);
+        for k in 0..LANES {
+            let along = vector(&first.along, first_at + k);
+            let inward = vector(&first.inward, first_at + k);
+            let seconds = [&second.along_along, &second.along_inward, &second.inward_inward];
+            out[k] = curvature_across(along, inward, seconds.map(|d| vector(d, at + k)));
+        }
+    }
+    out
+}
+
+/// Normal curvature along the direction normal to `along`, from first derivatives over 7 and second
+/// derivatives over 42.
+#[inline(always)]
+fn curvature_across(along: [f64; 3], inward: [f64; 3], second: [[f64; 3]; 3]) -> f64 {
+    // symbols: n the degree; across = x along + y inward
+    let n = DEGREE as f64;
+    let normal = unit(cross(along, inward));
+    let across = unit(cross(normal, along));
+    let y = 1.0 / dot(inward, across);
+    let x = -y * dot(inward, along) / dot(along, along);
+    let [aa, ab, bb] = second.map(|d| dot(d, normal));
+    (n - 1.0) / n * (x * x * aa + 2.0 * x * y * ab + y * y * bb)
+}
+
+#[inline(always)]
+fn unit(a: [f64; 3]) -> [f64; 3] {
+    let length = dot(a, a).sqrt();
+    a.map(|x| x / length)
+}
+
+/// Median and 99th percentile; not-a-number if one of the jumps is, or if there is none.
+pub(crate) fn percentiles(jumps: &mut [f64]) -> CurvatureJump {
+    CurvatureJump { median: percentile(jumps, 50), p99: percentile(jumps, 99) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Net;
-    use isospline_geometry::bezier_triangle::exponents;
+    use crate::edges::Gauge;
+    use crate::surface::{Net, Surface};
+    use crate::topology::Topology;
+    use isospline_geometry::Vec3;
+    use isospline_geometry::bezier_triangle::{exponents, index};
+    use isospline_implicit::Jet1;
 
     /// The graph of `c y^2 / 2 + x y` over the triangle (0,0), (1,0), (0.5, side), degree 7.
     fn graph(c: f64, side: f64) -> Net {
@@ -162,28 +198,33 @@ mod tests {
         Surface::new(vertices, vec![[0, 1, 2], [1, 0, 3]], vec![above, turned]).unwrap()
     }
 
-    fn jump(left: f64, right: f64) -> CurvatureJump {
+    fn jump(left: f64, right: f64) -> f64 {
         let surface = two_graphs(left, right);
-        measure(&surface, &Topology::of(&surface), &|n, body| (0..n).for_each(body))
+        let flat = Jet1 { value: 0.0, gradient: Vec3::z() };
+        let at_vertices = vec![flat; surface.vertices().len()];
+        let joints = Topology::of(&surface).joints;
+        let jumps = Gauge::new(&surface, &at_vertices).measure(&joints).jumps;
+        assert_eq!(jumps.len(), 1);
+        jumps[0]
     }
 
     #[test]
     fn a_known_jump_is_measured() {
         // At (x, 0) the graph has slope x in y: across the edge k = c / (1 + x^2)^(3/2), so both
         // the largest jump and the largest curvature stand at the origin.
-        assert!((jump(2.0, 1.5).p99 - 0.25).abs() < 1e-13);
-        assert!((jump(-1.0, 1.0).median - 2.0).abs() < 1e-13);
+        assert!((jump(2.0, 1.5) - 0.25).abs() < 1e-13);
+        assert!((jump(-1.0, 1.0) - 2.0).abs() < 1e-13);
     }
 
     #[test]
     fn one_polynomial_on_both_sides_has_no_jump() {
-        assert!(jump(1.3, 1.3).p99 < 1e-13);
+        assert!(jump(1.3, 1.3) < 1e-13);
     }
 
     #[test]
     fn flat_patches_are_held_against_the_diagonal() {
         let surface = two_graphs(0.0, 0.0);
-        let found = jump(0.0, 1e-6).p99;
+        let found = jump(0.0, 1e-6);
         let expected = 1e-6 / (FLAT_REL / surface.diagonal());
         assert!((found / expected - 1.0).abs() < 1e-6, "{found:e} {expected:e}");
     }

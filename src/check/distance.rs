@@ -1,73 +1,80 @@
 //! Distance, normals and flips of patches against the field, on a sample grid.
+#![expect(clippy::inline_always, reason = "kernels must be compiled for the widest vectors whole")]
 
-use crate::evaluate::{PreparedPatch, Stencil, StencilTable};
-use crate::lent_threads::{ForEach, map};
+use crate::evaluate::Stencil;
+use crate::grid::Grid;
+use crate::lanes::{LANES, Lane, dot, normal, vector};
+use crate::lent_threads::{ForEach, blocks};
+use crate::octet::{Curve, Octet, PatchPoints};
 use crate::report::{Place, worse};
+use crate::slope::{Slope, Slopes, Steepest};
 use crate::surface::{Net, Surface};
-use isospline_geometry::Vec3;
-use isospline_implicit::{Field, Jet1};
+use isospline_implicit::{BLOCK, Field, Jet1, Kernel, run_widest};
 
 /// Steps a side of the sample grid: 153 points a patch.
 pub(crate) const GRID: usize = 16;
 
 /// What one patch shows; distances in model units, first order.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceFigures {
     pub(crate) max: f64,
     /// Grid index of the largest distance.
-    pub(crate) worst: usize,
+    pub(crate) worst: u32,
+    flipped: bool,
+}
+
+/// What patches one after another show together.
+#[derive(Debug, Default)]
+pub(crate) struct Distances {
+    pub(crate) faces: Vec<FaceFigures>,
     sum: f64,
     sum_sq: f64,
-    /// Largest angle between patch normal and gradient.
-    steepest: Slope,
-    /// Grid index of `steepest`.
-    steepest_at: usize,
-    flipped: bool,
-    degenerate: u64,
-    not_finite: u64,
+    /// Largest angle between patch normal and gradient, its patch and grid index.
+    steepest: (Slope, usize, usize),
+    pub(crate) degenerate: u64,
+    pub(crate) not_finite: u64,
 }
 
 /// Figures of all patches together.
 #[derive(Debug)]
 pub(crate) struct Distance {
-    pub(crate) faces: Vec<FaceFigures>,
     pub(crate) max: f64,
     pub(crate) rms: f64,
     pub(crate) mean: f64,
     pub(crate) normal_deg_max: f64,
     pub(crate) worst_normal: Option<Place>,
     pub(crate) flipped: u64,
-    pub(crate) degenerate: u64,
-    pub(crate) not_finite: u64,
 }
 
-pub(crate) fn measure(surface: &Surface<'_>, field: &dyn Field, for_each: ForEach<'_>) -> Distance {
-    let grid = StencilTable::grid(GRID);
-    let faces = map(for_each, surface.faces().len(), |range| {
-        let mut sampler = Sampler::new(field, &grid);
-        range.map(|f| sampler.measure(&surface.net(f))).collect()
-    });
-    let n_samples = (faces.len() * grid.stencils().len()) as f64;
-    let mut out = Distance {
-        max: faces.iter().fold(0.0, |acc, f| worse(acc, f.max)),
-        rms: (faces.iter().map(|f| f.sum_sq).sum::<f64>() / n_samples).sqrt(),
-        mean: faces.iter().map(|f| f.sum).sum::<f64>() / n_samples,
-        normal_deg_max: 0.0,
-        worst_normal: None,
-        flipped: faces.iter().map(|f| u64::from(f.flipped)).sum(),
-        degenerate: faces.iter().map(|f| f.degenerate).sum(),
-        not_finite: faces.iter().map(|f| f.not_finite).sum(),
-        faces,
-    };
-    for (f, figures) in out.faces.iter().enumerate() {
-        let angle = figures.steepest.angle_deg();
-        if out.worst_normal.is_none() || angle > out.normal_deg_max {
-            out.worst_normal =
-                Some(place(surface, f, &grid.stencils()[figures.steepest_at], angle));
+impl Distances {
+    /// Takes in the patches that follow.
+    pub(crate) fn append(&mut self, other: Self) {
+        let (slope, face, at) = other.steepest;
+        if slope.is_steeper_than(&self.steepest.0) {
+            self.steepest = (slope, face + self.faces.len(), at);
         }
-        out.normal_deg_max = worse(out.normal_deg_max, angle);
+        self.faces.extend(other.faces);
+        self.sum += other.sum;
+        self.sum_sq += other.sum_sq;
+        self.degenerate += other.degenerate;
+        self.not_finite += other.not_finite;
     }
-    out
+
+    /// The figures of the whole surface, if these are all its patches.
+    pub(crate) fn summary(&self, surface: &Surface<'_>, grid: &Grid) -> Distance {
+        let n_samples = (self.faces.len() * grid.places().len()) as f64;
+        let (slope, face, at) = self.steepest;
+        let angle = slope.angle_deg();
+        let worst_normal = || place(surface, face, &grid.stencil(at), angle);
+        Distance {
+            max: self.faces.iter().fold(0.0, |acc, f| worse(acc, f.max)),
+            rms: (self.sum_sq / n_samples).sqrt(),
+            mean: self.sum / n_samples,
+            normal_deg_max: angle,
+            worst_normal: (!self.faces.is_empty()).then(worst_normal),
+            flipped: self.faces.iter().map(|f| u64::from(f.flipped)).sum(),
+        }
+    }
 }
 
 /// A face whose patch will not do.
@@ -87,127 +94,234 @@ pub fn unfit_faces(
     limit: f64,
     for_each: ForEach<'_>,
 ) -> Vec<UnfitFace> {
-    let faces = measure(surface, field, for_each).faces;
+    let grid = Grid::new(GRID);
+    let faces = blocks(for_each, surface.faces().len(), |range| {
+        let (mut octet, mut sampler) = (Octet::new(), Sampler::new(field, &grid));
+        let nets: Vec<Net> = range.map(|f| surface.net(f)).collect();
+        for nets in nets.chunks(LANES) {
+            octet.set(nets);
+            sampler.enter(&octet, nets.len());
+        }
+        sampler.found.faces
+    });
     let is_unfit = |figures: &FaceFigures| figures.flipped || figures.max > limit;
-    let unfit = (0..).zip(faces).filter(|(_, figures)| is_unfit(figures));
+    let unfit = (0..).zip(faces.into_iter().flatten()).filter(|(_, figures)| is_unfit(figures));
     unfit.map(|(face, figures)| UnfitFace { face, folds: figures.flipped }).collect()
 }
 
 /// The place of `stencil` on face `f`.
 pub(crate) fn place(surface: &Surface<'_>, f: usize, stencil: &Stencil, value: f64) -> Place {
-    let point = PreparedPatch::new(&surface.net(f)).evaluate(stencil).point.into();
+    let point = stencil.point(&surface.net(f)).into();
     Place { face: f as u32, barycentric: stencil.at, point, value }
 }
 
 /// Distance to first order, `|f| / |grad f|`; not-a-number where the gradient vanishes.
+#[inline(always)]
 pub(crate) fn first_order(jet: &Jet1) -> f64 {
-    let slope = jet.gradient.norm();
-    // An exact zero: with f = 0 the quotient is not a number anyway, with f > 0 it would be
-    // infinite; both mean that nothing is known here.
-    if slope > 0.0 { jet.value.abs() / slope } else { f64::NAN }
+    over_slope(jet.value, jet.gradient.into())
 }
 
-/// Scratch of one thread: a patch's points, normals and field values.
-struct Sampler<'a> {
+#[inline(always)]
+fn over_slope(value: f64, gradient: [f64; 3]) -> f64 {
+    let slope = dot(gradient, gradient).sqrt();
+    // An exact zero: with f = 0 the quotient is not a number anyway, with f > 0 it would be
+    // infinite; both mean that nothing is known here.
+    if slope > 0.0 { value.abs() / slope } else { f64::NAN }
+}
+
+/// Samples patches; what it has found so far.
+pub(crate) struct Sampler<'a> {
     field: &'a dyn Field,
-    grid: &'a StencilTable,
-    points: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    jets: Vec<Jet1>,
+    grid: &'a Grid,
+    batch: Batch,
+    pub(crate) found: Distances,
 }
 
 impl<'a> Sampler<'a> {
-    fn new(field: &'a dyn Field, grid: &'a StencilTable) -> Self {
-        let jet = Jet1 { value: 0.0, gradient: Vec3::zeros() };
-        let n = grid.stencils().len();
-        let (points, jets) = (vec![Vec3::zeros(); n], vec![jet; n]);
-        Self { field, grid, normals: points.clone(), points, jets }
+    pub(crate) fn new(field: &'a dyn Field, grid: &'a Grid) -> Self {
+        Self { field, grid, batch: Batch::new(), found: Distances::default() }
     }
 
-    fn measure(&mut self, net: &Net) -> FaceFigures {
-        let patch = PreparedPatch::new(net);
-        let mut out = FaceFigures::default();
-        let (points, normals) = (&mut self.points, &mut self.normals);
-        patch.evaluate_all(self.grid, |i, at| {
-            points[i] = at.point;
-            normals[i] = at.normal;
-            out.degenerate += u64::from(at.is_degenerate());
-        });
-        self.field.gradients(points, &mut self.jets);
-        for (i, (normal, jet)) in normals.iter().zip(&self.jets).enumerate() {
-            out.enter(i, normal, jet);
-        }
-        out
-    }
-}
-
-impl FaceFigures {
-    fn enter(&mut self, i: usize, normal: &Vec3, jet: &Jet1) {
-        let distance = first_order(jet);
-        self.not_finite += u64::from(!distance.is_finite());
-        if distance > self.max || distance.is_nan() {
-            self.worst = i;
-        }
-        self.max = worse(self.max, distance);
-        self.sum += distance;
-        self.sum_sq += distance * distance;
-        let slope = Slope::between(normal, &jet.gradient);
-        self.flipped |= slope.cosine < 0.0;
-        if slope.is_steeper_than(&self.steepest) {
-            self.steepest = slope;
-            self.steepest_at = i;
+    /// Samples the next patches, the first `n` of an octet.
+    pub(crate) fn enter(&mut self, octet: &Octet, n: usize) {
+        let Self { field, grid, batch, found } = self;
+        let tally = run_widest(Sample { field: *field, grid, octet, batch });
+        for k in 0..n {
+            let slope = tally.steepest.of(k);
+            if slope.is_steeper_than(&found.steepest.0) {
+                found.steepest = (slope, found.faces.len(), tally.steepest.at(k));
+            }
+            found.sum += tally.sum[k];
+            found.sum_sq += tally.sum_sq[k];
+            found.degenerate += tally.degenerate[k] as u64;
+            found.not_finite += tally.not_finite[k] as u64;
+            found.faces.push(FaceFigures {
+                max: tally.max[k],
+                worst: tally.worst[k] as u32,
+                flipped: tally.least_cosine[k] < 0.0,
+            });
         }
     }
 }
 
-/// An angle kept as (sine, cosine) times a common length: one arc tangent a patch is enough.
-#[derive(Clone, Copy, Debug, Default)]
-struct Slope {
-    sine_sq: f64,
-    cosine: f64,
-    /// Grows with the angle, from 0 at 0 to 2 at half a turn; not-a-number for zero vectors.
-    rank: f64,
+/// Points of a grid whose samples on eight patches fill a block of the field.
+const POINTS: usize = BLOCK / LANES;
+
+/// Some grid points on eight patches, the patches of a point beside each other.
+#[repr(C, align(64))]
+struct Batch {
+    curve: Curve,
+    point: [[f64; BLOCK]; 3],
+    along: [[f64; BLOCK]; 3],
+    across: [[f64; BLOCK]; 3],
+    jets: [[f64; BLOCK]; 4],
+    distance: [f64; BLOCK],
+    slopes: Slopes<BLOCK>,
+    /// Ones where there is no normal.
+    degenerate: [f64; BLOCK],
+    /// Grid points before these, and of these.
+    first: usize,
+    n: usize,
 }
 
-impl Slope {
-    #[inline]
-    fn between(a: &Vec3, b: &Vec3) -> Self {
-        let (sine_sq, cosine) = (a.cross(b).norm_squared(), a.dot(b));
-        let part = sine_sq / (sine_sq + cosine * cosine);
-        Self { sine_sq, cosine, rank: if cosine < 0.0 { 2.0 - part } else { part } }
-    }
-
-    #[inline]
-    fn is_steeper_than(&self, other: &Self) -> bool {
-        self.rank > other.rank || (self.rank.is_nan() && !other.rank.is_nan())
-    }
-
-    fn angle_deg(&self) -> f64 {
-        if self.rank.is_nan() {
-            return f64::NAN;
+impl Batch {
+    fn new() -> Self {
+        let (zero, zeros) = ([0.0; BLOCK], [[0.0; BLOCK]; 3]);
+        Self {
+            curve: Curve::new(),
+            point: zeros,
+            along: zeros,
+            across: zeros,
+            jets: [zero; 4],
+            distance: zero,
+            slopes: Slopes::new(),
+            degenerate: zero,
+            first: 0,
+            n: 0,
         }
-        libm::atan2(self.sine_sq.sqrt(), self.cosine).to_degrees()
+    }
+
+    #[inline(always)]
+    fn push(&mut self, origin: &[Lane; 3], points: &PatchPoints) {
+        let at = LANES * self.n;
+        for c in 0..3 {
+            for k in 0..LANES {
+                self.point[c][at + k] = origin[c][k] + points.offset[c][k];
+            }
+            self.along[c][at..at + LANES].copy_from_slice(&points.along[c]);
+            self.across[c][at..at + LANES].copy_from_slice(&points.across[c]);
+        }
+        self.n += 1;
+    }
+
+    /// Distances and angles at all places; those beyond `n` hold any numbers.
+    #[inline(always)]
+    fn compare(&mut self) {
+        let [value, gradient @ ..] = &self.jets;
+        for i in 0..BLOCK {
+            let gradient = vector(gradient, i);
+            self.distance[i] = over_slope(value[i], gradient);
+            let (normal, exists) = normal(vector(&self.along, i), vector(&self.across, i));
+            self.degenerate[i] = if exists { 0.0 } else { 1.0 };
+            self.slopes.set(i, Slope::between(normal, gradient));
+        }
+    }
+}
+
+/// What eight patches show, each in its lane; counts are exact in floats.
+struct Tally {
+    max: Lane,
+    worst: Lane,
+    sum: Lane,
+    sum_sq: Lane,
+    steepest: Steepest,
+    least_cosine: Lane,
+    degenerate: Lane,
+    not_finite: Lane,
+}
+
+struct Sample<'a> {
+    field: &'a dyn Field,
+    grid: &'a Grid,
+    octet: &'a Octet,
+    batch: &'a mut Batch,
+}
+
+impl Kernel for Sample<'_> {
+    type Output = Tally;
+
+    #[inline(always)]
+    fn run(self) -> Tally {
+        let Self { field, grid, octet, batch } = self;
+        let mut tally = Tally::new();
+        let n_points = grid.places().len();
+        (batch.first, batch.n) = (0, 0);
+        for row in grid.rows() {
+            batch.curve.set(octet, row);
+            for point in &row.points {
+                batch.push(&octet.origin, &batch.curve.at(point));
+                if batch.n == POINTS || batch.first + batch.n == n_points {
+                    field.gradient_block(LANES * batch.n, &batch.point, &mut batch.jets);
+                    batch.compare();
+                    tally.enter(batch);
+                    batch.first += batch.n;
+                    batch.n = 0;
+                }
+            }
+        }
+        tally
+    }
+}
+
+impl Tally {
+    fn new() -> Self {
+        let zero = [0.0; LANES];
+        Self {
+            max: zero,
+            worst: zero,
+            sum: zero,
+            sum_sq: zero,
+            steepest: Steepest::NONE,
+            least_cosine: zero,
+            degenerate: zero,
+            not_finite: zero,
+        }
+    }
+
+    /// Takes in a batch.
+    #[inline(always)]
+    fn enter(&mut self, batch: &Batch) {
+        for point in 0..batch.n {
+            let (at, first) = (batch.first + point, LANES * point);
+            self.enter_distances(at, &batch.distance, first);
+            self.steepest.enter(at, &batch.slopes, first);
+            for k in 0..LANES {
+                let cosine = batch.slopes.cosine[first + k];
+                let least = self.least_cosine[k];
+                self.least_cosine[k] = if cosine < least { cosine } else { least };
+                self.degenerate[k] += batch.degenerate[first + k];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn enter_distances(&mut self, at: usize, distance: &[f64; BLOCK], first: usize) {
+        for k in 0..LANES {
+            let (x, max) = (distance[first + k], self.max[k]);
+            let is_worse = !(max.is_nan() | (x <= max));
+            self.max[k] = if is_worse { x } else { max };
+            self.worst[k] = if is_worse { at as f64 } else { self.worst[k] };
+            self.sum[k] += x;
+            self.sum_sq[k] += x * x;
+            self.not_finite[k] += if x.is_finite() { 0.0 } else { 1.0 };
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn slopes_rank_as_their_angles_do() {
-        let turned = |a: f64| Vec3::new(libm::sin(a), 0.0, libm::cos(a));
-        let angles = [1e-9, 1e-4, 0.5, 1.5, 1.6, 3.0, 3.1];
-        let slopes = angles.map(|a| Slope::between(&Vec3::z(), &(7.0 * turned(a))));
-        for pair in slopes.windows(2) {
-            assert!(pair[1].is_steeper_than(&pair[0]) && !pair[0].is_steeper_than(&pair[1]));
-        }
-        for (slope, angle) in slopes.iter().zip(angles) {
-            assert!((slope.angle_deg() - angle.to_degrees()).abs() < 1e-12);
-        }
-        let none = Slope::between(&Vec3::zeros(), &Vec3::z());
-        assert!(none.is_steeper_than(&slopes[6]) && none.angle_deg().is_nan());
-    }
+    use isospline_geometry::Vec3;
 
     #[test]
     fn a_vanishing_gradient_leaves_the_distance_unknown() {

@@ -1,9 +1,10 @@
 //! The largest distance, sought between the samples and confirmed by its foot point.
 
-use crate::distance::{Distance, GRID, first_order, place};
-use crate::evaluate::{PreparedPatch, Stencil, StencilTable};
+use crate::distance::{FaceFigures, GRID, first_order, place};
+use crate::evaluate::Stencil;
+use crate::grid::Grid;
 use crate::report::{Place, worse};
-use crate::surface::Surface;
+use crate::surface::{Net, Surface};
 use isospline_geometry::Vec3;
 use isospline_implicit::Field;
 
@@ -18,30 +19,30 @@ const MAX_CANDIDATES: usize = 256;
 pub(crate) fn largest(
     surface: &Surface<'_>,
     field: &dyn Field,
-    distance: &Distance,
+    faces: &[FaceFigures],
+    grid: &Grid,
 ) -> Option<(f64, Place)> {
-    let grid = StencilTable::grid(GRID);
-    let mut order: Vec<usize> = (0..distance.faces.len()).collect();
+    let mut order: Vec<usize> = (0..faces.len()).collect();
     // Not-a-number sorts first: it is the worst of all.
-    order.sort_by(|&a, &b| distance.faces[b].max.total_cmp(&distance.faces[a].max));
+    order.sort_by(|&a, &b| faces[b].max.total_cmp(&faces[a].max));
     let mut best: Option<(f64, Place)> = None;
     for (n, &f) in order.iter().enumerate() {
-        let on_grid = distance.faces[f].max;
+        let on_grid = faces[f].max;
         let so_far = best.map_or(0.0, |(d, _)| d);
         if best.is_some() && (so_far.is_nan() || on_grid < MAY_STILL_WIN * so_far) {
             break;
         }
-        let start = &grid.stencils()[distance.faces[f].worst];
+        let start = grid.stencil(faces[f].worst as usize);
         if on_grid.is_nan() || n >= MAX_CANDIDATES {
             let better = worse(so_far, on_grid);
             if best.is_none() || better > so_far || better.is_nan() {
-                best = Some((better, place(surface, f, start, better)));
+                best = Some((better, place(surface, f, &start, better)));
             }
             break;
         }
-        let patch = PreparedPatch::new(&surface.net(f));
-        let (at, estimate) = climb(&patch, field, start.at, on_grid);
-        let found = confirmed(patch.evaluate(&at).point, field).unwrap_or(estimate);
+        let net = surface.net(f);
+        let (at, estimate) = climb(&net, field, start.at, on_grid);
+        let found = confirmed(at.point(&net), field).unwrap_or(estimate);
         let better = worse(so_far, found);
         if best.is_none() || better > so_far || better.is_nan() {
             best = Some((better, place(surface, f, &at, better)));
@@ -52,14 +53,14 @@ pub(crate) fn largest(
 
 /// Climbs to a local maximum of the first-order distance: the best of six neighbours in
 /// barycentric space while one is higher, else half the step, down to 1/64 of a grid step.
-fn climb(patch: &PreparedPatch, field: &dyn Field, start: [f64; 3], value: f64) -> (Stencil, f64) {
+fn climb(net: &Net, field: &dyn Field, start: [f64; 3], value: f64) -> (Stencil, f64) {
     let (mut best, mut height) = (Stencil::new(start), value);
     let mut step = 1.0 / GRID as f64;
     while step > 1.0 / (64 * GRID) as f64 {
         let mut has_moved = false;
         for candidate in neighbours(best.at, step) {
             let stencil = Stencil::new(candidate);
-            let found = first_order(&field.gradient(patch.evaluate(&stencil).point));
+            let found = first_order(&field.gradient(stencil.point(net)));
             if found.is_nan() {
                 return (stencil, found);
             }
@@ -153,7 +154,7 @@ mod tests {
         })
         .with_gradient(|_| Vec3::z());
         let start = [0.5, 0.25, 0.25];
-        let (at, height) = climb(&PreparedPatch::new(&net), &field, start, 0.0);
+        let (at, height) = climb(&net, &field, start, 0.0);
         assert!((at.at[0] - 0.3).abs() < 2e-3 && (at.at[1] - 0.5).abs() < 2e-3, "{at:?}");
         assert!((height - 0.01).abs() < 1e-7);
     }

@@ -129,9 +129,19 @@ impl<'a> Surface<'a> {
         Aabb::around(&self.vertices).diagonal()
     }
 
+    /// The vertex at corner 0 of a face.
+    pub(crate) fn corner(&self, face: usize) -> Vec3 {
+        self.vertices[self.faces[face][0] as usize]
+    }
+
     pub(crate) fn origin(&self, h: HalfEdge) -> u32 {
         self.faces[h.face() as usize][h.corner() as usize]
     }
+}
+
+/// Whether two points agree in all bits.
+pub(crate) fn same_bits(p: &Vec3, q: &Vec3) -> bool {
+    (0..3).all(|k| p[k].to_bits() == q[k].to_bits())
 }
 
 fn require_vertices(faces: &[[u32; 3]], vertices: usize) -> Result<(), SurfaceError> {

@@ -1,8 +1,8 @@
 //! Neighbours, edges, fans and components, found from the face list alone.
 
+use crate::nesting;
 use crate::report::{Component, EdgeDefects};
 use crate::surface::Surface;
-use crate::{nesting, volume};
 use isospline_geometry::HalfEdge;
 
 /// Marks a half-edge that has no single, oppositely directed partner.
@@ -22,7 +22,10 @@ pub(crate) struct Topology {
     pub(crate) joints: Vec<Joint>,
     pub(crate) n_edges: usize,
     pub(crate) defects: EdgeDefects,
+    /// In order of their lowest face, volumes left open.
     pub(crate) components: Vec<Component>,
+    /// The faces of each.
+    pub(crate) faces_of: Vec<Vec<u32>>,
 }
 
 impl Topology {
@@ -32,6 +35,7 @@ impl Topology {
             n_edges: 0,
             defects: EdgeDefects::default(),
             components: Vec::new(),
+            faces_of: Vec::new(),
         };
         let mut opposite = vec![ALONE; 3 * surface.faces().len()];
         let edge_list = sorted_half_edges(surface);
@@ -42,13 +46,20 @@ impl Topology {
         let repeats = |f: &&[u32; 3]| f[0] == f[1] || f[1] == f[2] || f[2] == f[0];
         topology.defects.repeated_corners = surface.faces().iter().filter(repeats).count() as u64;
         topology.count_fans(surface, &opposite);
-        topology.components = components(surface, &opposite);
+        (topology.components, topology.faces_of) = components(surface, &opposite);
         topology
     }
 
     /// `V - E + F`.
     pub(crate) fn euler_characteristic(&self, surface: &Surface<'_>) -> i64 {
         surface.vertices().len() as i64 - self.n_edges as i64 + surface.faces().len() as i64
+    }
+
+    /// Sets the volume of each component to that under its faces.
+    pub(crate) fn enter_volumes(&mut self, volume: impl Fn(&[u32]) -> f64) {
+        for (component, faces) in self.components.iter_mut().zip(&self.faces_of) {
+            component.volume = volume(faces);
+        }
     }
 
     /// Sorts one edge, given by all half-edges along it, into joints and defects.
@@ -121,8 +132,8 @@ fn fan_length(opposite: &[u32], start: u32) -> usize {
     n_faces
 }
 
-/// Components in order of their lowest face.
-fn components(surface: &Surface<'_>, opposite: &[u32]) -> Vec<Component> {
+/// Components in order of their lowest face, and the faces of each.
+fn components(surface: &Surface<'_>, opposite: &[u32]) -> (Vec<Component>, Vec<Vec<u32>>) {
     let mut seen = vec![false; surface.faces().len()];
     let mut out = Vec::new();
     let mut faces_of = Vec::new();
@@ -136,7 +147,7 @@ fn components(surface: &Surface<'_>, opposite: &[u32]) -> Vec<Component> {
     for (component, depth) in out.iter_mut().zip(nesting::depths(surface, &faces_of)) {
         component.depth = depth;
     }
-    out
+    (out, faces_of)
 }
 
 /// The component that holds a face, and its faces.
@@ -174,7 +185,7 @@ fn component(
         vertices: vertices.len() as u64,
         euler_characteristic,
         genus: is_closed.then_some(1 - euler_characteristic / 2),
-        volume: volume::enclosed(surface, &faces),
+        volume: f64::NAN,
         depth: 0,
     };
     (component, faces)

@@ -33,11 +33,17 @@ pub fn exponents(n: usize) -> impl Iterator<Item = [usize; 3]> {
 }
 
 /// Indices in the degree-7 net of the 15 interior points, in storage order.
-pub fn interior_indices() -> [usize; N_INTERIOR] {
+pub const fn interior_indices() -> [usize; N_INTERIOR] {
     let mut out = [0; N_INTERIOR];
-    let inner = exponents(DEGREE).filter(|e| e.iter().all(|&x| x > 0));
-    for (slot, e) in out.iter_mut().zip(inner) {
-        *slot = index(e);
+    let (mut row, mut slot) = (2, 0);
+    while row < DEGREE {
+        let mut k = 1;
+        while k < row {
+            out[slot] = index([DEGREE - row, row - k, k]);
+            slot += 1;
+            k += 1;
+        }
+        row += 1;
     }
     out
 }
@@ -60,14 +66,26 @@ pub const fn boundary_index(n: usize, corner: usize, s: usize) -> usize {
 
 /// A net of degree `N - 1` with these curves, counter-clockwise, as its boundary, zero inside; `M` is
 /// [`n_control`] of the degree.
+#[inline]
 pub fn net_of_boundary<const N: usize, const M: usize>(curves: &[[Vec3; N]; 3]) -> [Vec3; M] {
     let mut net = [Vec3::zeros(); M];
-    for (corner, curve) in curves.iter().enumerate() {
-        for (s, &p) in curve.iter().enumerate() {
-            net[boundary_index(N - 1, corner, s)] = p;
+    for (row, curve) in const { boundary_rows::<N>() }.iter().zip(curves) {
+        for (&i, &p) in row.iter().zip(curve) {
+            net[i] = p;
         }
     }
     net
+}
+
+/// Indices of the three boundary rows of a net of degree `N - 1`.
+const fn boundary_rows<const N: usize>() -> [[usize; N]; 3] {
+    let mut out = [[0; N]; 3];
+    let mut at = 0;
+    while at < 3 * N {
+        out[at / N][at % N] = boundary_index(N - 1, at / N, at % N);
+        at += 1;
+    }
+    out
 }
 
 /// Index of step `s` (0..n) of the first row inside the edge from `corner` to `corner + 1`.
@@ -136,6 +154,8 @@ mod tests {
     #[test]
     fn interior_slots_agree_with_the_full_net() {
         let interior = interior_indices();
+        let inner = exponents(DEGREE).filter(|e| e.iter().all(|&x| x > 0));
+        assert!(inner.map(index).eq(interior));
         for corner in 0..3 {
             for s in 1..=5 {
                 let slot = first_inner_slot(corner, s);

@@ -178,11 +178,11 @@ impl<F: Field> Field for Oriented<F> {
         self.inner.gradient_block(n, points, out);
         let sign = self.sign();
         let [value, slopes @ ..] = out;
-        for f in value {
+        for f in &mut value[..n] {
             *f = sign * (*f - self.level);
         }
-        for slope in slopes.iter_mut().flatten() {
-            *slope *= sign;
+        for slopes in slopes {
+            slopes[..n].iter_mut().for_each(|slope| *slope *= sign);
         }
     }
 

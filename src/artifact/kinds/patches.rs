@@ -69,10 +69,10 @@ impl PatchesView<'_> {
     /// faces carry the same bits along their shared edge.
     pub fn net(&self, face: usize) -> [Vec3; N_CONTROL] {
         let curve = |corner| self.raised_edge(face, corner, raise_quartic_to_septic);
-        let mut net = net_of_boundary(&[0, 1, 2].map(curve));
-        let inner = self.interior[face].chunks_exact(3);
-        for (slot, p) in interior_indices().into_iter().zip(inner) {
-            net[slot] = Vec3::new(p[0], p[1], p[2]);
+        let mut net = net_of_boundary(&[curve(0), curve(1), curve(2)]);
+        let (inner, _) = self.interior[face].as_chunks();
+        for (slot, &p) in const { interior_indices() }.into_iter().zip(inner) {
+            net[slot] = Vec3::from(p);
         }
         net
     }
