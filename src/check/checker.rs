@@ -63,7 +63,9 @@ fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
         |range| gauge.measure(range),
     );
     let mut faces = Faces::default();
-    blocks.into_iter().for_each(|block| faces.append(block));
+    for block in blocks {
+        faces.append(block);
+    }
     topology.enter_volumes(|faces_of| volume::enclosed(surface, faces_of, &faces.moments));
     let gauge = edges::Gauge::new(surface, &at_vertices);
     let (worst, blocks) = blocks_beside(
@@ -73,7 +75,9 @@ fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
         |range| gauge.measure(&topology.joints[range]),
     );
     let mut edges = Edges::default();
-    blocks.into_iter().for_each(|block| edges.append(block));
+    for block in blocks {
+        edges.append(block);
+    }
     Parts { topology, faces, edges, worst, at_vertices, grid }.report(job)
 }
 

@@ -5,7 +5,7 @@ use crate::distance::place;
 use crate::evaluate::Stencil;
 use crate::lanes::{LANES, Lane, Triple, dot, minus, normal, vector};
 use crate::report::{Place, worse};
-use crate::seam::{Derivatives, N_EDGE_POINTS, N_SAMPLES, Seam, parameter};
+use crate::seam::{Both, Derivatives, N_EDGE_POINTS, N_SAMPLES, Seam, parameter};
 use crate::slope::{Slope, Slopes, Steepest};
 use crate::surface::Surface;
 use isospline_geometry::HalfEdge;
@@ -127,12 +127,12 @@ impl Angles {
 
     /// Become those between two sides.
     #[inline(always)]
-    pub(crate) fn set(&mut self, [left, right]: &[Derivatives; 2]) {
+    pub(crate) fn set(&mut self, Both { left, right }: &Both<Derivatives>) {
         for i in 0..N_SAMPLES {
             let (a, a_exists) = normal(vector(&left.along, i), vector(&left.inward, i));
             let (b, b_exists) = normal(vector(&right.along, i), vector(&right.inward, i));
             let slope = Slope::between(a, b);
-            let both_exist = a_exists & b_exists;
+            let both_exist = a_exists && b_exists;
             self.slopes.set(i, if both_exist { slope } else { Slope::HALF_TURN });
             self.degenerate[i] = if both_exist { 0.0 } else { 1.0 };
         }
@@ -156,7 +156,7 @@ mod tests {
 
     fn angles(left: Derivatives, right: Derivatives) -> Angles {
         let mut angles = Angles::new();
-        angles.set(&[left, right]);
+        angles.set(&Both { left, right });
         angles
     }
 

@@ -5,7 +5,7 @@ use crate::grid::bernstein;
 use crate::lanes::{LANES, Lane, cross, dot, minus, put, vector, weighed};
 use crate::percentile::percentile;
 use crate::report::worse;
-use crate::seam::{Derivatives, N_EDGE_POINTS, Seam, Side};
+use crate::seam::{Both, Derivatives, N_EDGE_POINTS, Seam, Side};
 use isospline_geometry::bezier_triangle::DEGREE;
 
 /// Percentiles over edges of their relative curvature jumps.
@@ -50,12 +50,9 @@ pub(crate) struct Second {
 /// from each side; an edge's figure is its largest jump over its largest curvature, which counts as
 /// `flat` at least.
 #[inline(always)]
-pub(crate) fn relative_jumps(
-    [first_left, first_right]: &[Derivatives; 2],
-    [second_left, second_right]: &[Second; 2],
-    flat: f64,
-) -> Lane {
-    let (a, b) = (curvatures(first_left, second_left), curvatures(first_right, second_right));
+pub(crate) fn relative_jumps(first: &Both<Derivatives>, second: &Both<Second>, flat: f64) -> Lane {
+    let a = curvatures(&first.left, &second.left);
+    let b = curvatures(&first.right, &second.right);
     let (mut jump, mut scale) = ([0.0; LANES], [flat; LANES]);
     for (a, b) in a.iter().zip(&b) {
         for k in 0..LANES {
@@ -75,10 +72,10 @@ impl Second {
 
     /// Become those on both sides of a seam, the points in the order of the left one.
     #[inline(always)]
-    pub(crate) fn set_both([left, right]: &mut [Self; 2], seam: &Seam, table: &CurvatureTable) {
+    pub(crate) fn set_both(both: &mut Both<Self>, seam: &Seam, table: &CurvatureTable) {
         let CurvatureTable(points) = table;
-        left.set(&seam.left, points.iter());
-        right.set(&seam.right, points.iter().rev());
+        both.left.set(&seam.left, points.iter());
+        both.right.set(&seam.right, points.iter().rev());
     }
 
     #[inline(always)]

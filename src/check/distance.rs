@@ -94,8 +94,19 @@ pub fn unfit_faces(
     limit: f64,
     for_each: ForEach<'_>,
 ) -> Vec<UnfitFace> {
+    let is_unfit = |figures: &FaceFigures| figures.flipped || figures.max > limit;
+    let faces = (0..).zip(face_figures(surface, field, for_each));
+    let unfit = faces.filter(|(_, figures)| is_unfit(figures));
+    unfit.map(|(face, figures)| UnfitFace { face, folds: figures.flipped }).collect()
+}
+
+fn face_figures(
+    surface: &Surface<'_>,
+    field: &dyn Field,
+    for_each: ForEach<'_>,
+) -> Vec<FaceFigures> {
     let grid = Grid::new(GRID);
-    let faces = blocks(for_each, surface.faces().len(), |range| {
+    let blocks = blocks(for_each, surface.faces().len(), |range| {
         let (mut octet, mut sampler) = (Octet::new(), Sampler::new(field, &grid));
         let nets: Vec<Net> = range.map(|f| surface.net(f)).collect();
         for nets in nets.chunks(LANES) {
@@ -104,9 +115,7 @@ pub fn unfit_faces(
         }
         sampler.found.faces
     });
-    let is_unfit = |figures: &FaceFigures| figures.flipped || figures.max > limit;
-    let unfit = (0..).zip(faces.into_iter().flatten()).filter(|(_, figures)| is_unfit(figures));
-    unfit.map(|(face, figures)| UnfitFace { face, folds: figures.flipped }).collect()
+    blocks.concat()
 }
 
 /// The place of `stencil` on face `f`.
@@ -308,7 +317,7 @@ impl Tally {
     fn enter_distances(&mut self, at: usize, distance: &[f64; BLOCK], first: usize) {
         for k in 0..LANES {
             let (x, max) = (distance[first + k], self.max[k]);
-            let is_worse = !(max.is_nan() | (x <= max));
+            let is_worse = !(max.is_nan() || x <= max);
             self.max[k] = if is_worse { x } else { max };
             self.worst[k] = if is_worse { at as f64 } else { self.worst[k] };
             self.sum[k] += x;
@@ -321,7 +330,25 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::box_spline::{Knots, torus};
+    use crate::lent_threads::on_this_thread;
     use isospline_geometry::Vec3;
+
+    #[test]
+    fn samples_side_by_side_show_what_single_points_show() {
+        // 30 patches: the last ones do not fill an octet.
+        let (surface, field, grid) = (Knots::surface(5, 3), torus(), Grid::new(GRID));
+        let found = face_figures(&surface, &field, &on_this_thread);
+        assert_eq!(found.len(), 30);
+        for (f, found) in found.iter().enumerate() {
+            let net = surface.net(f);
+            let distance = |i: usize| first_order(&field.gradient(grid.stencil(i).point(&net)));
+            let max = (0..grid.places().len()).map(distance).fold(0.0, f64::max);
+            assert!(max > 0.1 && (found.max - max).abs() < 1e-14, "{} {max}", found.max);
+            assert!((distance(found.worst as usize) - max).abs() < 1e-14);
+            assert!(!found.flipped);
+        }
+    }
 
     #[test]
     fn a_vanishing_gradient_leaves_the_distance_unknown() {

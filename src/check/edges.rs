@@ -4,7 +4,7 @@
 use crate::continuity::{self, Angles, Continuity};
 use crate::curvature::{CurvatureTable, FLAT_REL, Second, relative_jumps};
 use crate::lanes::{LANES, Lane, Triple};
-use crate::seam::{Derivatives, EdgeTable, Seam};
+use crate::seam::{Both, Derivatives, EdgeTable, Seam};
 use crate::sector::{Ends, Weights, both_ends};
 use crate::surface::Surface;
 use crate::topology::Joint;
@@ -80,8 +80,8 @@ impl Edges {
 struct Desk {
     seam: Seam,
     normals: [Triple; 2],
-    first: [Derivatives; 2],
-    second: [Second; 2],
+    first: Both<Derivatives>,
+    second: Both<Second>,
     angles: Angles,
 }
 
@@ -90,8 +90,8 @@ impl Desk {
         Self {
             seam: Seam::new(),
             normals: [[[0.0; LANES]; 3]; 2],
-            first: [Derivatives::new(), Derivatives::new()],
-            second: [Second::new(), Second::new()],
+            first: Both { left: Derivatives::new(), right: Derivatives::new() },
+            second: Both { left: Second::new(), right: Second::new() },
             angles: Angles::new(),
         }
     }

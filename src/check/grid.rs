@@ -107,7 +107,9 @@ mod tests {
                     assert_eq!(Some(place), points.next());
                     let mut found = [0.0; 28];
                     for (sum, along) in row.sums.iter().zip(weights) {
-                        sum.iter().for_each(|&(i, weight)| found[i] += along * weight);
+                        for &(i, weight) in sum {
+                            found[i] += along * weight;
+                        }
                     }
                     for (found, weight) in found.iter().zip(Stencil::new(*place).weights) {
                         assert!((found - weight).abs() < 1e-15, "{found} {weight} at {place:?}");

@@ -40,9 +40,7 @@ pub(crate) fn minus(a: &Triple, b: &Triple) -> Triple {
 #[inline(always)]
 pub(crate) fn put<const N: usize>(parts: [Triple; N], out: &mut [Lane]) {
     for (out, part) in out.iter_mut().zip(parts.as_flattened()) {
-        for k in 0..LANES {
-            out[k] = part[k];
-        }
+        *out = *part;
     }
 }
 

@@ -19,14 +19,17 @@ const N_ROWS: usize = 3 * DEGREE;
 /// Index in the net of each, by the corner at which the edge begins.
 const ROWS: [[usize; N_ROWS]; 3] = [rows(0), rows(1), rows(2)];
 
-/// The patches on both sides of eight edges.
-#[repr(C, align(64))]
-pub(crate) struct Seam {
-    pub(crate) left: Side,
-    pub(crate) right: Side,
+/// Something of both sides of an edge.
+pub(crate) struct Both<T> {
+    pub(crate) left: T,
+    pub(crate) right: T,
 }
 
+/// The patches on both sides of eight edges.
+pub(crate) type Seam = Both<Side>;
+
 /// Eight patches along a half-edge each, in its direction.
+#[repr(C, align(64))]
 pub(crate) struct Side {
     rows: [Triple; N_ROWS],
 }
@@ -129,10 +132,10 @@ impl Derivatives {
 
     /// Become those on both sides of a seam, the points in the order of the left one.
     #[inline(always)]
-    pub(crate) fn set_both([left, right]: &mut [Self; 2], seam: &Seam, table: &EdgeTable) {
+    pub(crate) fn set_both(both: &mut Both<Self>, seam: &Seam, table: &EdgeTable) {
         let EdgeTable(points) = table;
-        left.set(&seam.left, points.iter());
-        right.set(&seam.right, points.iter().rev());
+        both.left.set(&seam.left, points.iter());
+        both.right.set(&seam.right, points.iter().rev());
     }
 
     #[inline(always)]

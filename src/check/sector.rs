@@ -73,7 +73,7 @@ impl Ends {
             let against_q = |a: &Triple| dot(cross(vector(a, k), q), vector(normals, k));
             let (pq, rq) = (against_q(&p), against_q(&r));
             out.lambda[k] = pq / (pq - rq);
-            out.in_range[k] = if (pq < 0.0) & (rq > 0.0) { 1.0 } else { 0.0 };
+            out.in_range[k] = if pq < 0.0 && rq > 0.0 { 1.0 } else { 0.0 };
         }
         out
     }

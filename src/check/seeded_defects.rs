@@ -6,6 +6,7 @@ use isospline_geometry::Vec3;
 use isospline_geometry::bezier_triangle::{
     boundary_index, exponents, first_inner_index, index, interior_indices,
 };
+use isospline_implicit::{InstructionSet, use_at_most};
 use std::collections::BTreeMap;
 
 const EXPECTED: Expected =
@@ -276,6 +277,38 @@ fn the_report_is_the_same_in_all_bits_whatever_order_the_blocks_run_in() {
     let found = json(check(&job, &backwards));
     assert_eq!(found, json(check(&job, &on_this_thread)));
     assert!(found.contains(r#""repairs":{"adapt.edges_split":3}"#), "{found}");
+}
+
+#[test]
+fn a_kink_is_named_where_it_is() {
+    for (n, f) in [5, 263, 575].into_iter().enumerate() {
+        let mut draft = Draft::sound();
+        let step = 2 + n;
+        let moved = first_inner_index(7, n, step);
+        draft.nets[f][moved] += 1e-4 * Vec3::new(0.6, -0.48, 0.64);
+        let edge = [draft.nets[f][boundary_index(7, n, 0)], draft.nets[f][boundary_index(7, n, 7)]];
+        let at = draft.report().worst_g1_angle.unwrap();
+        // B6 of the step is largest at step / 6.
+        let t = step as f64 / 6.0;
+        let expected = (1.0 - t) * edge[0] + t * edge[1];
+        let apart = (Vec3::from(at.point) - expected).norm();
+        assert!(apart < 0.1 * (edge[1] - edge[0]).norm(), "{apart} {at:?}");
+    }
+}
+
+#[test]
+fn the_report_is_the_same_in_all_bits_for_every_instruction_set() {
+    let mut draft = Draft::sound();
+    // Not the same everywhere, and with figures that are not numbers.
+    draft.nets[7][20].x += 0.1;
+    draft.nets[100][17].z = f64::NAN;
+    let reports =
+        [InstructionSet::Plain, InstructionSet::Avx2, InstructionSet::Avx512].map(|set| {
+            use_at_most(set);
+            serde_json::to_string(&draft.clone().report()).unwrap()
+        });
+    assert_eq!(reports[0], reports[1]);
+    assert_eq!(reports[0], reports[2]);
 }
 
 #[test]

@@ -28,7 +28,7 @@ impl Slope {
     /// Whether it is the larger angle; not-a-number is larger than all others.
     #[inline(always)]
     pub(crate) fn is_steeper_than(&self, other: &Self) -> bool {
-        (self.rank > other.rank) | (self.rank.is_nan() & !other.rank.is_nan())
+        self.rank > other.rank || (self.rank.is_nan() && !other.rank.is_nan())
     }
 
     pub(crate) fn angle_deg(&self) -> f64 {
