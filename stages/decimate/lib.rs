@@ -11,6 +11,7 @@ mod heap;
 mod params;
 mod quadric;
 mod queue;
+mod refusals;
 mod simplify;
 mod surface;
 mod tiles;

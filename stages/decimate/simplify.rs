@@ -3,16 +3,20 @@
 use crate::guards::{Guards, LEVELS, Merge};
 use crate::quadric::Quadric;
 use crate::queue::EdgeQueue;
+use crate::refusals::Refusals;
 use crate::surface::SurfaceData;
 use crate::tiles;
 use crate::{DecimateError, DecimateParams};
 use isospline_geometry::{EditMesh, HalfEdge, TriangleMesh, Vec3};
-use isospline_stage::{Counters, Ctx};
+use isospline_stage::{Counters, Ctx, Host, Serial, map};
 
 /// Part of the faces after which all edges are queued again: a refused collapse is dropped, and
 /// may be allowed when its surroundings have changed. On deccube, 234 248 faces to 5000, one pass
 /// alone left errors of 1.0e-2 where this leaves 3.4e-3; the queue costs 2 % of the time.
 const REFILL: f64 = 0.67;
+
+/// Faces whose edges are costed in a task.
+const FACES_A_TASK: usize = 512;
 
 /// Collapses edges until at most `params.faces` are left.
 pub(crate) fn simplify(
@@ -64,6 +68,7 @@ pub(crate) struct Run {
     /// Vertices that stay as they are; none if empty.
     pub(crate) locked: Vec<bool>,
     queue: EdgeQueue,
+    refusals: Refusals,
 }
 
 impl Vertices {
@@ -81,13 +86,14 @@ impl Vertices {
 impl Run {
     pub(crate) fn new(mesh: EditMesh, vertices: Vertices) -> Self {
         let queue = EdgeQueue::new(3 * mesh.face_rows());
-        Self { mesh, vertices, locked: Vec::new(), queue }
+        let refusals = Refusals::new(&mesh);
+        Self { mesh, vertices, locked: Vec::new(), queue, refusals }
     }
 
     /// Collapses what the guards allow until at most `wanted` faces are left or nothing can go.
     pub(crate) fn reach_or_stop(&mut self, params: &DecimateParams, wanted: usize) {
         let guards = Guards::at_level(params, 0);
-        self.set_all_costs();
+        self.set_all_costs(&Serial);
         while self.mesh.face_count() > wanted {
             let before = self.mesh.face_count();
             self.refill_and_pass(&guards, wanted);
@@ -106,7 +112,7 @@ impl Run {
         let wanted = params.faces as usize;
         let total = self.mesh.face_count() - wanted;
         let mut level = 0;
-        self.set_all_costs();
+        self.set_all_costs(ctx.host);
         while self.mesh.face_count() > wanted {
             let before = self.mesh.face_count();
             ctx.host.progress((wanted + total - before) as u64, total as u64)?;
@@ -116,7 +122,10 @@ impl Run {
                 0 => counters.count("collapses", collapses),
                 _ => counters.repair("collapses_past_guards", collapses),
             }
-            level += u32::from(collapses == 0);
+            if collapses == 0 {
+                level += 1;
+                self.refusals.forget();
+            }
             if level == LEVELS {
                 let least = self.mesh.face_count() as u32;
                 return Err(DecimateError::TooFewFaces { wanted: params.faces, least });
@@ -125,11 +134,18 @@ impl Run {
         Ok(())
     }
 
-    fn set_all_costs(&mut self) {
+    fn set_all_costs(&mut self, host: &dyn Host) {
         let Self { mesh, vertices, queue, .. } = self;
-        for h in mesh.edges() {
+        let n_faces = mesh.face_rows();
+        let found = map(host, n_faces.div_ceil(FACES_A_TASK), |task| {
+            let first = task * FACES_A_TASK;
+            let edges = mesh.edge_list(first..(first + FACES_A_TASK).min(n_faces));
+            let cost = |h: HalfEdge| (h, best_merge(mesh, &vertices.quadrics, h).1);
+            edges.into_iter().map(cost).collect::<Vec<_>>()
+        });
+        for (h, cost) in found.into_iter().flatten() {
             if let Some(o) = mesh.opposite(h) {
-                queue.set(h, o, best_merge(mesh, &vertices.quadrics, h).1);
+                queue.set(h, o, cost);
             }
         }
     }
@@ -145,9 +161,9 @@ impl Run {
 
     fn collapse(&mut self, h: HalfEdge, guards: &Guards) {
         let (a, b) = (self.mesh.origin(h) as usize, self.mesh.target(h) as usize);
-        let Self { mesh, vertices, locked, queue } = self;
+        let Self { mesh, vertices, locked, queue, refusals } = self;
         let is_locked = |v: usize| locked.get(v).copied().unwrap_or(false);
-        if is_locked(a) || is_locked(b) {
+        if is_locked(a) || is_locked(b) || refusals.still_hold(mesh, h) {
             return;
         }
         let Vertices { quadrics, weights, normals } = vertices;
@@ -155,6 +171,7 @@ impl Run {
         let sum = weights[a] * normals[a] + weights[b] * normals[b];
         let merge = Merge { edge: h, position, normal: sum.try_normalize(0.0).unwrap_or(sum) };
         if !guards.allow(mesh, normals, &merge) || !mesh.can_collapse(h) {
+            refusals.note(h);
             return;
         }
         mesh.collapse(h);
@@ -162,6 +179,7 @@ impl Run {
         normals[a] = merge.normal;
         weights[a] += weights[b];
         quadrics[a] = quadrics[a].plus(&quadrics[b]);
+        refusals.note_change(mesh, a as u32);
         for s in mesh.spokes(a as u32) {
             if let Some(o) = mesh.opposite(s) {
                 queue.push(s, o, best_merge(mesh, quadrics, s).1);
