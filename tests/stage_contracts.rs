@@ -74,7 +74,7 @@ fn run<S: Stage>(inputs: &[(&'static str, &dyn SectionSource)]) -> S::Output {
 fn chain() -> &'static Chain {
     static CHAIN: OnceLock<Chain> = OnceLock::new();
     CHAIN.get_or_init(|| {
-        let base_mesh = freeze(&mesh(), &torus()).unwrap();
+        let base_mesh = freeze(&mesh(), &torus(), &Serial).unwrap();
         let base = (BaseMesh::KIND, &base_mesh as &dyn SectionSource);
         let curvature = run::<CurvatureStage>(&[base]);
         let network = run::<NetworkStage>(&[base, (Curvature::KIND, &curvature)]);

@@ -1,18 +1,15 @@
 //! How far the curve of an edge will be from the surface, before it is fitted.
 
-use crate::quartic::{N_SAMPLES, Samples};
+use crate::sampled::{MOST_EDGES, quartic_errors};
 use crate::vertex::Vertex;
 use isospline_fitting::normal_curve::slant::Slant;
 use isospline_fitting::normal_curve::{NormalEdge, NormalFit, NormalOptions};
 use isospline_fitting::paper_curve::Ends;
-use isospline_geometry::Vec3;
-use isospline_implicit::{Field, Jet1};
+use isospline_implicit::Field;
 use isospline_stage::{Host, map};
 
-/// Error, times the chord, of an edge without a sound curve: worse than any other.
-const UNSOUND: f64 = 0.1;
-/// Edges judged together: 320 points fill the evaluator's blocks and stay in the nearest cache.
-const BATCH: usize = 64;
+/// Edges judged together: their samples fill the evaluator's blocks and stay in the nearest cache.
+const BATCH: usize = MOST_EDGES;
 /// Batches a task: fewer cost more to hand out than a second thread gains.
 const BATCHES_A_TASK: usize = 2;
 
@@ -69,7 +66,7 @@ impl Measure {
         edges: &[JudgedEdge<'_>],
     ) -> Vec<f64> {
         let of_batch = |batch: &[JudgedEdge<'_>]| match self {
-            Self::Paper => errors_of(field, &batch.iter().map(|e| e.ends).collect::<Vec<_>>()),
+            Self::Paper => quartic_errors(field, &batch.iter().map(|e| e.ends).collect::<Vec<_>>()),
             Self::Normal(fit) => normal_errors_of(fit, field, batch),
         };
         let tasks: Vec<_> = edges.chunks(BATCH * BATCHES_A_TASK).collect();
@@ -99,7 +96,7 @@ fn normal_errors_of(fits: &NormalMeasure, field: &dyn Field, edges: &[JudgedEdge
     for (i, error) in hard.into_iter().zip(fitted(&fits.patient, &again)) {
         normal[i] = error;
     }
-    let parametric = errors_of(field, &edges.iter().map(|e| e.ends).collect::<Vec<_>>());
+    let parametric = quartic_errors(field, &edges.iter().map(|e| e.ends).collect::<Vec<_>>());
     // Without a curve that of the paper stays.
     let sum = |(normal, parametric): (Option<f64>, f64)| {
         normal.map_or(parametric, |normal| normal + PARAMETRIC_PART * parametric)
@@ -115,42 +112,11 @@ fn slants([a, b]: &[&Vertex; 2], [left, right]: &[&Vertex; 2]) -> [Slant; 2] {
     [at(a, b, left, right), at(b, a, right, left)]
 }
 
-/// Largest distance from the surface of the quartic between each pair of vertices, in model units.
-///
-/// The quartic has position, tangent plane and normal curvature of the surface at both ends and is
-/// the nearest such curve to the projected chord [TK, Eq. (9)]: what the network stage will fit,
-/// from fewer samples. Fifteen gradient evaluations an edge.
-fn errors_of(field: &dyn Field, edges: &[[&Vertex; 2]]) -> Vec<f64> {
-    let samples = Samples::new();
-    let chord_point = |[p, q]: &[&Vertex; 2], t: f64| p.position + t * (q.position - p.position);
-    let mut points: Vec<Vec3> =
-        edges.iter().flat_map(|e| samples.places.map(|t| chord_point(e, t))).collect();
-    let mut jets = vec![Jet1 { value: 0.0, gradient: Vec3::zeros() }; points.len()];
-    for _ in 0..2 {
-        field.gradients(&points, &mut jets);
-        for (p, jet) in points.iter_mut().zip(&jets) {
-            *p -= jet.value / jet.gradient.norm_squared() * jet.gradient;
-        }
-    }
-    let sound = samples.move_to_quartics(edges, points.as_chunks_mut().0);
-    field.gradients(&points, &mut jets);
-    let judged = edges.iter().zip(sound).zip(jets.as_chunks::<N_SAMPLES>().0);
-    judged.map(|((ends, sound), jets)| error_of(ends, sound, jets)).collect()
-}
-
-fn error_of([p, q]: &[&Vertex; 2], sound: bool, jets: &[Jet1; N_SAMPLES]) -> f64 {
-    let distance = jets.iter().fold(0.0, |worst: f64, jet| {
-        let distance = jet.value.abs() / jet.gradient.norm();
-        if distance.is_finite() { worst.max(distance) } else { f64::INFINITY }
-    });
-    let usable = sound && distance.is_finite();
-    if usable { distance } else { UNSOUND * (q.position - p.position).norm() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::vertex::vertices_at;
+    use isospline_geometry::Vec3;
     use isospline_implicit::ClosureField;
     use isospline_stage::Serial;
 

@@ -9,8 +9,8 @@ use isospline_stage::{Serial, map};
 /// An edge with the error of its curve, in model units.
 pub(crate) type EdgeError = (HalfEdge, f64);
 
-/// Faces whose edges are looked at in a task.
-const FACES_A_TASK: usize = 512;
+/// Edges looked at in a task.
+const EDGES_A_TASK: usize = 256;
 /// Diagonals judged in a task.
 const DIAGONALS_A_TASK: usize = 128;
 
@@ -22,6 +22,8 @@ const DIAGONALS_A_TASK: usize = 128;
 #[derive(Debug, Default)]
 pub(crate) struct ErrorCache {
     own: Rows,
+    /// When the errors of all edges were known; 0 is before all.
+    complete: u32,
     diagonal: Rows,
     pub(crate) merges: KnownMerges,
 }
@@ -30,47 +32,71 @@ impl ErrorCache {
     /// Each edge with the error of its own curve.
     pub(crate) fn edges(&mut self, surface: &SurfaceMesh<'_>) -> Vec<EdgeError> {
         self.own.grow(surface);
-        let n_faces = surface.mesh.face_rows();
+        let open = edges_edited_since(surface, self.complete);
+        let tasks: Vec<_> = open.chunks(EDGES_A_TASK).collect();
         let rows = &self.own;
-        let found = map(surface.host, n_faces.div_ceil(FACES_A_TASK), |task| {
-            let first = task * FACES_A_TASK;
-            let edges = surface.mesh.edge_list(first..(first + FACES_A_TASK).min(n_faces));
-            rows.look(surface, edges, |_| true, own_pair)
+        let found = map(surface.host, tasks.len(), |task| {
+            rows.look(surface, tasks[task].iter().copied(), |_| true, own_pair)
         });
-        let mut edges = Vec::with_capacity(surface.mesh.face_count() * 3 / 2 + 1);
         for look in found {
-            edges.extend_from_slice(&look.edges);
             self.own.take(surface, look);
         }
-        edges
+        self.complete = surface.now();
+        let edges = surface.mesh.edge_list(0..surface.mesh.face_rows());
+        edges.into_iter().map(|h| (h, self.own.errors[h.row()])).collect()
     }
 
-    /// The errors of the curves between the vertices opposite to edges, at a border of their own.
-    /// Infinite for those that are not `wanted`, unless known.
-    pub(crate) fn diagonals(
+    /// Those of some edges, with the errors of their own curves, for which it `is_better` to have
+    /// the curve between the vertices opposite to them, of which it is told both errors; at a border
+    /// that is their own. Curves that are not `wanted` have infinite errors, unless known.
+    pub(crate) fn better_flips(
         &mut self,
         surface: &SurfaceMesh<'_>,
-        edges: &[HalfEdge],
+        edges: &[EdgeError],
         wanted: impl Fn(HalfEdge) -> bool + Sync,
-    ) -> Vec<f64> {
+        is_better: impl Fn(HalfEdge, [f64; 2]) -> bool + Sync,
+    ) -> Vec<HalfEdge> {
         self.diagonal.grow(surface);
         let tasks: Vec<_> = edges.chunks(DIAGONALS_A_TASK).collect();
         let rows = &self.diagonal;
         let found = map(surface.host, tasks.len(), |task| {
-            rows.look(surface, tasks[task].to_vec(), &wanted, diagonal_pair)
+            let halves = tasks[task].iter().map(|&(h, _)| h);
+            let look = rows.look(surface, halves, &wanted, diagonal_pair);
+            let both = tasks[task].iter().zip(&look.edges);
+            let is_better =
+                |&(&(h, now), &(_, then)): &(&EdgeError, &EdgeError)| is_better(h, [now, then]);
+            let better: Vec<HalfEdge> = both.filter(is_better).map(|(&(h, _), _)| h).collect();
+            (look, better)
         });
-        let mut errors = Vec::with_capacity(edges.len());
-        for look in found {
-            errors.extend(look.edges.iter().map(|&(_, error)| error));
+        let mut all = Vec::new();
+        for (look, better) in found {
+            all.extend(better);
             self.diagonal.take(surface, look);
         }
-        errors
+        all
     }
 
-    /// What [`Self::diagonals`] said of an edge, if nothing beside it has changed since.
+    /// What [`Self::better_flips`] found of an edge, if nothing beside it has changed since.
     pub(crate) fn known_diagonal(&self, surface: &SurfaceMesh<'_>, h: HalfEdge) -> Option<f64> {
         self.diagonal.known(surface, h)
     }
+}
+
+/// The edges beside faces that were edited after a time, one half-edge each: the lower.
+fn edges_edited_since(surface: &SurfaceMesh<'_>, time: u32) -> Vec<HalfEdge> {
+    let mut edges = Vec::new();
+    for face in surface.mesh.live_faces().filter(|&f| !surface.is_as_at(time, f)) {
+        for h in [0, 1, 2].map(|k| HalfEdge::new(face, k)) {
+            let other = surface.mesh.opposite(h);
+            // The lower one comes by itself if its face was edited too.
+            match other.filter(|&o| o < h) {
+                Some(o) if surface.is_as_at(time, o.face()) => edges.push(o),
+                Some(_) => {}
+                None => edges.push(h),
+            }
+        }
+    }
+    edges
 }
 
 /// The ends of a curve and the vertices on its left and right.
@@ -129,13 +155,13 @@ impl Rows {
     fn look(
         &self,
         surface: &SurfaceMesh<'_>,
-        edges: Vec<HalfEdge>,
+        edges: impl ExactSizeIterator<Item = HalfEdge>,
         wanted: impl Fn(HalfEdge) -> bool,
         pair: impl Fn(&SurfaceMesh<'_>, HalfEdge) -> Pair,
     ) -> Look {
         let mut look = Look { edges: Vec::with_capacity(edges.len()), new: Vec::new() };
         let (mut judged, mut places) = (Vec::new(), Vec::new());
-        for (h, place) in edges.into_iter().zip(0u32..) {
+        for (h, place) in edges.zip(0u32..) {
             if let Some(error) = self.known(surface, h) {
                 look.edges.push((h, error));
                 continue;

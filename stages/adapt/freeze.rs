@@ -5,6 +5,8 @@ use isospline_artifact::kinds::{BaseMesh, Bounds, EdgeKind, Fan, Frame};
 use isospline_geometry::triangle_mesh::{BORDER, Defect};
 use isospline_geometry::{HalfEdge, TriangleMesh, Vec3};
 use isospline_implicit::{Field, Jet1};
+use isospline_stage::Host;
+use std::sync::OnceLock;
 
 /// Why a mesh cannot be frozen.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -30,23 +32,35 @@ pub enum FreezeError {
     },
 }
 
-/// Orders the mesh and fills every row of the base mesh. Positions keep their bits.
+/// Orders the mesh and fills every row of the base mesh, on the host's threads. Positions keep their
+/// bits.
 ///
 /// # Errors
 /// [`FreezeError`] for meshes that are open or not manifold, and where there is no normal.
-pub fn freeze(mesh: &TriangleMesh, field: &dyn Field) -> Result<BaseMesh, FreezeError> {
+pub fn freeze(
+    mesh: &TriangleMesh,
+    field: &dyn Field,
+    host: &dyn Host,
+) -> Result<BaseMesh, FreezeError> {
     let mesh = in_front_order(mesh);
     let opposite = mesh.opposites().map_err(FreezeError::NotManifold)?;
     mesh.check_fans(&opposite).map_err(FreezeError::NotManifold)?;
     refuse_borders(&mesh, &opposite)?;
-    let component = mesh.face_components(&opposite);
-    let edges = Edges::of(&mesh, &opposite);
-    let stars = Stars::of(&mesh, &opposite);
+    let (edges, about) = both(
+        host,
+        || Edges::of(&mesh, &opposite),
+        || {
+            let component = mesh.face_components(&opposite);
+            let frames = frames(&mesh, field, &component)?;
+            Ok((component, frames, Stars::of(&mesh, &opposite)))
+        },
+    );
+    let (component, frame, stars) = about?;
     let corners = mesh.faces.as_flattened();
     let bounds = mesh.bounds();
     Ok(BaseMesh {
         position: mesh.positions.iter().map(|&p| p.into()).collect(),
-        frame: frames(&mesh, field, &component)?,
+        frame,
         shape: Vec::new(),
         face: mesh.faces.clone(),
         face_sheet: component,
@@ -66,6 +80,25 @@ pub fn freeze(mesh: &TriangleMesh, field: &dyn Field) -> Result<BaseMesh, Freeze
         }],
         opposite,
     })
+}
+
+/// What two computations give, each on a thread.
+fn both<A: Send + Sync, B: Send + Sync>(
+    host: &dyn Host,
+    first: impl Fn() -> A + Sync,
+    second: impl Fn() -> B + Sync,
+) -> (A, B) {
+    let (a, b) = (OnceLock::new(), OnceLock::new());
+    host.for_each(2, &|k| {
+        // A host calls each index once.
+        if k == 0 {
+            let _ = a.set(first());
+        } else {
+            let _ = b.set(second());
+        }
+    });
+    const RAN: &str = "invariant: each index ran";
+    (a.into_inner().expect(RAN), b.into_inner().expect(RAN))
 }
 
 fn refuse_borders(mesh: &TriangleMesh, opposite: &[u32]) -> Result<(), FreezeError> {
@@ -177,6 +210,7 @@ impl Stars {
 mod tests {
     use super::*;
     use isospline_implicit::ClosureField;
+    use isospline_stage::Serial;
 
     fn octahedron() -> TriangleMesh {
         let positions = vec![Vec3::x(), Vec3::y(), Vec3::z(), -Vec3::x(), -Vec3::y(), -Vec3::z()];
@@ -199,7 +233,7 @@ mod tests {
 
     #[test]
     fn every_adjacency_row_of_an_octahedron_agrees_with_the_faces() {
-        let base = freeze(&octahedron(), &sphere()).unwrap();
+        let base = freeze(&octahedron(), &sphere(), &Serial).unwrap();
         assert_eq!((base.edge.len(), base.star.len()), (12, 24));
         let origin = |h: u32| base.face[(h / 3) as usize][(h % 3) as usize];
         for (e, (&[a, b], &[h, g])) in base.edge.iter().zip(&base.edge_half).enumerate() {
@@ -222,7 +256,7 @@ mod tests {
 
     #[test]
     fn stars_turn_counter_clockwise_about_the_outward_normal() {
-        let base = freeze(&octahedron(), &sphere()).unwrap();
+        let base = freeze(&octahedron(), &sphere(), &Serial).unwrap();
         let origin = |h: u32| base.face[(h / 3) as usize][(h % 3) as usize] as usize;
         let at = |v: usize| Vec3::from(base.position[v]);
         for v in 0..6 {
@@ -240,14 +274,14 @@ mod tests {
     fn an_open_mesh_is_refused_with_its_border() {
         let mut mesh = octahedron();
         mesh.faces.pop();
-        let found = freeze(&mesh, &sphere()).unwrap_err();
+        let found = freeze(&mesh, &sphere(), &Serial).unwrap_err();
         assert!(matches!(found, FreezeError::Open { .. }), "{found:?}");
     }
 
     #[test]
     fn a_vertex_without_a_gradient_is_refused_with_its_place() {
         let flat = ClosureField::new(1.0, |_| 0.0).with_gradient(|_| Vec3::zeros());
-        let found = freeze(&octahedron(), &flat).unwrap_err();
+        let found = freeze(&octahedron(), &flat, &Serial).unwrap_err();
         assert!(matches!(found, FreezeError::NoNormal { .. }), "{found:?}");
     }
 }

@@ -3,13 +3,13 @@
 use crate::AdaptParams;
 use crate::curve_error::Measure;
 use crate::error_cache::{EdgeError, ErrorCache};
-use crate::gate::{Gate, quality};
+use crate::gate::{Gate, is_clearly_better, quality};
 use crate::merging::collapse_round;
+use crate::ranking::{First, ranked};
 use crate::surface_mesh::SurfaceMesh;
 use crate::vertex::Vertex;
 use isospline_geometry::HalfEdge;
 use isospline_stage::{Counters, Ctx, Stopped};
-use std::cmp::Ordering;
 
 /// A flip must make the curve of the edge this many times better.
 const FLIP_GAIN: f64 = 1.2;
@@ -26,6 +26,8 @@ const COLLAPSE_BELOW: f64 = 0.7;
 pub(crate) const ROOM: f64 = 0.85;
 /// Rounds without a better mesh before giving up.
 const PATIENCE: u32 = 2;
+/// Quality above which a face is no sliver, whatever it was before a flip.
+const GOOD_QUALITY: f64 = 0.2;
 /// Edges whose diagonals are judged together at least.
 const FLIPS_AT_ONCE: usize = 1024;
 
@@ -155,8 +157,7 @@ fn flip_round(
     let gains = |now: f64, then: f64| FLIP_GAIN * then < now;
     let may_gain =
         |&&(h, now): &&EdgeError| cache.known_diagonal(surface, h).is_none_or(|d| gains(now, d));
-    let mut order: Vec<EdgeError> = errors.iter().filter(may_gain).copied().collect();
-    order.sort_unstable_by(|x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
+    let order = ranked(errors.iter().filter(may_gain).copied(), usize::MAX, First::Worst);
     let mut touched = vec![false; surface.mesh.face_rows()];
     let mut n_flips = 0;
     // Batch by batch: a flip settles the edges about it, whose diagonals nobody asks for then.
@@ -166,13 +167,15 @@ fn flip_round(
             faces.into_iter().all(|h| !touched[h.face() as usize])
         };
         let open: Vec<EdgeError> = batch.iter().filter(|&&(h, _)| is_free(h)).copied().collect();
-        let halves: Vec<HalfEdge> = open.iter().map(|&(h, _)| h).collect();
-        let others = cache.diagonals(surface, &halves, |h| keeps_shape(surface, h));
-        for ((h, now), then) in open.into_iter().zip(others) {
+        let is_better = |h: HalfEdge, [now, then]: [f64; 2]| {
+            gains(now, then) && keeps_shape(surface, h) && keeps_gate(surface, gate, h)
+        };
+        let better = cache.better_flips(surface, &open, |h| keeps_shape(surface, h), is_better);
+        for h in better {
             let Some(o) = surface.mesh.opposite(h) else { continue };
             let faces = [h.face() as usize, o.face() as usize];
             let is_free = !faces.iter().any(|&f| touched[f]);
-            if gains(now, then) && is_free && flip_is_good(surface, gate, h) {
+            if is_free && keeps_valences(surface, h) && surface.mesh.can_flip(h) {
                 surface.flip(h);
                 for f in faces {
                     touched[f] = true;
@@ -184,38 +187,30 @@ fn flip_round(
     n_flips
 }
 
-fn flip_is_good(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge) -> bool {
+fn keeps_valences(surface: &SurfaceMesh<'_>, h: HalfEdge) -> bool {
     let Some(wings) = surface.wings(h) else { return false };
     let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
     ends.iter().all(|&v| surface.mesh.valence(v) > 4)
         && wings.iter().all(|&v| surface.mesh.valence(v) < 10)
-        && keeps_shape(surface, h)
-        && surface.flip_cost(gate, h).is_some_and(|[before, after]| after <= before.max(ROOM))
+}
+
+/// Whether the gate bears a flip. Like [`keeps_shape`] it stays so while the faces beside the edge
+/// do.
+fn keeps_gate(surface: &SurfaceMesh<'_>, gate: &Gate, h: HalfEdge) -> bool {
+    let Some([before, after]) = surface.faces_of_flip(h) else { return false };
+    let worst =
+        |[x, y]: [[&Vertex; 3]; 2]| gate.face_with_quality(&x).max(gate.face_with_quality(&y));
+    after.iter().all(|face| gate.is_clearly_below(face, ROOM))
+        || worst(after) <= worst(before).max(ROOM)
 }
 
 /// Whether a flip leaves no sliver. Unlike valences this stays so until a face beside the edge
 /// changes: edges that a round begins without it cannot flip in that round.
 fn keeps_shape(surface: &SurfaceMesh<'_>, h: HalfEdge) -> bool {
-    let Some(wings) = surface.wings(h) else { return false };
-    let [c, d] = wings.map(|v| surface.at(v));
-    let [a, b] = surface.ends(h);
-    let quality_of = |faces: [[&Vertex; 3]; 2]| quality(&faces[0]).min(quality(&faces[1]));
-    let before = quality_of([[a, b, c], [b, a, d]]);
-    quality_of([[d, c, a], [c, d, b]]) >= before.min(0.2)
-}
-
-/// The first `n` in order, sorted: most of a large mesh is never looked at.
-pub(crate) fn first_by(
-    mut edges: Vec<EdgeError>,
-    n: usize,
-    order: impl Fn(&EdgeError, &EdgeError) -> Ordering,
-) -> Vec<EdgeError> {
-    if n < edges.len() {
-        edges.select_nth_unstable_by(n, &order);
-        edges.truncate(n);
-    }
-    edges.sort_unstable_by(order);
-    edges
+    let Some([before, after]) = surface.faces_of_flip(h) else { return false };
+    let worst = |[x, y]: [[&Vertex; 3]; 2]| quality(&x).min(quality(&y));
+    after.iter().all(|face| is_clearly_better(face, GOOD_QUALITY))
+        || worst(after) >= worst(before).min(GOOD_QUALITY)
 }
 
 /// Splits up to `n_room` edges, the worst that can be, none beside another.
@@ -225,7 +220,7 @@ fn split_round(
     errors: Vec<EdgeError>,
     n_room: usize,
 ) -> u64 {
-    let bad = first_by(errors, 12 * n_room, |x, y| y.1.total_cmp(&x.1).then(x.0.cmp(&y.0)));
+    let bad = ranked(errors.into_iter(), 12 * n_room, First::Worst);
     let mut touched = vec![false; surface.mesh.vertex_rows()];
     let mut n_split = 0;
     // Batch by batch: most of the later ones are not needed.

@@ -17,7 +17,9 @@ mod merging;
 pub mod order;
 mod params;
 mod quartic;
+mod ranking;
 mod repair;
+mod sampled;
 mod surface_mesh;
 mod unfit_faces;
 mod vertex;
@@ -31,6 +33,7 @@ use gate::Gate;
 use isospline_artifact::kinds::{BaseMesh, MeshView, TopologyProof};
 use isospline_geometry::TriangleMesh;
 use isospline_stage::{Counters, Ctx, Piece, Plan, Stage, Task};
+use repair::Search;
 use surface_mesh::SurfaceMesh;
 
 /// Stage `adapt`.
@@ -76,7 +79,7 @@ impl Stage for Adapt {
         counters.count("faces_out", fit.faces.len() as u64);
         let excess = fit.faces.len().saturating_sub(mesh.face.len());
         counters.repair("faces_over_target", excess as u64);
-        let mut rows = freeze::freeze(&fit, ctx.field)?;
+        let mut rows = freeze::freeze(&fit, ctx.field, ctx.host)?;
         if self.params.vertices == Vertices::Free {
             free_vertices::settle(ctx, &mut rows, &mut counters)?;
         }
@@ -97,10 +100,11 @@ impl Adapt {
         let mut cache = ErrorCache::default();
         let error_in = improve::worst_curve_error_rel(&surface, &mut cache);
         counters.max("curve_error_rel_in", error_in);
+        let mut search = Search::default();
         if improving {
-            repair::soften(&mut surface, &self.params, counters);
+            repair::soften(&mut surface, &self.params, &mut search, counters);
         }
-        repair::make_fit(ctx, &mut surface, &self.params, counters)?;
+        repair::make_fit(ctx, &mut surface, &self.params, &mut search, counters)?;
         let goal = (&self.params, n_faces);
         improve::trim(&mut surface, goal, &mut cache, counters);
         if improving {
@@ -128,7 +132,7 @@ impl Adapt {
         counters: &mut Counters,
     ) -> Result<(), AdaptError> {
         // The rounds so far may have made room for slivers to go.
-        repair::soften(surface, &self.params, counters);
+        repair::soften(surface, &self.params, &mut Search::default(), counters);
         surface.measure = Measure::normal();
         let mut cache = ErrorCache::default();
         let error_in = improve::worst_curve_error_rel(surface, &mut cache);

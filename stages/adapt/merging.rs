@@ -3,8 +3,9 @@
 use crate::curve_error::JudgedEdge;
 use crate::error_cache::EdgeError;
 use crate::gate::Gate;
-use crate::improve::{ROOM, first_by};
+use crate::improve::ROOM;
 use crate::known_merges::{KnownMerges, Merge};
+use crate::ranking::{First, ranked};
 use crate::surface_mesh::SurfaceMesh;
 use isospline_geometry::HalfEdge;
 use isospline_stage::{Serial, map};
@@ -117,7 +118,7 @@ fn is_free(surface: &SurfaceMesh<'_>, h: HalfEdge, touched: &[bool]) -> bool {
 fn judge_longest(surface: &SurfaceMesh<'_>, merges: &mut [Merge]) {
     let is_open = |k: &usize| merges[*k].longest.is_none() && merges[*k].merged.is_some();
     let open: Vec<usize> = (0..merges.len()).filter(is_open).collect();
-    let errors = judged(surface, merges, &open, |fan| vec![take_longest(fan)]);
+    let errors = judged(surface, merges, &open, |fan, edges| edges.push(take_longest(fan)));
     for (k, error) in open.into_iter().zip(errors) {
         merges[k].longest = Some(error);
     }
@@ -127,9 +128,9 @@ fn judge_longest(surface: &SurfaceMesh<'_>, merges: &mut [Merge]) {
 fn judge_whole(surface: &SurfaceMesh<'_>, merges: &mut [Merge], among: &[usize]) {
     let open = among.iter().copied().filter(|&k| merges[k].whole.is_none());
     let open: Vec<usize> = open.collect();
-    let errors = judged(surface, merges, &open, |fan| {
+    let errors = judged(surface, merges, &open, |fan, edges| {
         take_longest(fan);
-        std::mem::take(fan)
+        edges.extend_from_slice(fan);
     });
     for (k, error) in open.into_iter().zip(errors) {
         merges[k].whole = merges[k].longest.map(|longest| longest.max(error));
@@ -142,13 +143,17 @@ fn judged(
     surface: &SurfaceMesh<'_>,
     merges: &[Merge],
     chosen: &[usize],
-    pick: impl for<'s> Fn(&mut Vec<JudgedEdge<'s>>) -> Vec<JudgedEdge<'s>> + Sync,
+    pick: impl for<'s> Fn(&mut Vec<JudgedEdge<'s>>, &mut Vec<JudgedEdge<'s>>) + Sync,
 ) -> Vec<f64> {
     let tasks: Vec<_> = chosen.chunks(CANDIDATES_A_TASK).collect();
     let errors = map(surface.host, tasks.len(), |task| {
-        let (mut owners, mut edges) = (Vec::new(), Vec::new());
+        let most = 12 * tasks[task].len();
+        let (mut owners, mut edges) = (Vec::with_capacity(most), Vec::with_capacity(most));
+        let mut about = Vec::with_capacity(16);
         for (k, &candidate) in tasks[task].iter().enumerate() {
-            edges.extend(pick(&mut fan(surface, &merges[candidate])));
+            about.clear();
+            fan(surface, &merges[candidate], &mut about);
+            pick(&mut about, &mut edges);
             owners.resize(edges.len(), k);
         }
         let mut errors = vec![0.0f64; tasks[task].len()];
@@ -161,16 +166,17 @@ fn judged(
     errors.concat()
 }
 
-/// The edges about a merged vertex; none if there is no such vertex.
-fn fan<'s>(surface: &'s SurfaceMesh<'_>, merge: &'s Merge) -> Vec<JudgedEdge<'s>> {
-    let (h, Some(merged)) = (merge.h, &merge.merged) else { return Vec::new() };
+/// Adds the edges about a merged vertex; none if there is no such vertex.
+fn fan<'s>(surface: &'s SurfaceMesh<'_>, merge: &'s Merge, edges: &mut Vec<JudgedEdge<'s>>) {
+    let (h, Some(merged)) = (merge.h, &merge.merged) else { return };
     let spoke = |v: u32| JudgedEdge { ends: [merged, surface.at(v)], wings: None };
     // A wing comes twice, and its curve need not be judged twice.
     let end = surface.mesh.origin(h);
     let second = surface.mesh.valence(end) - 1;
     let wings = surface.wings(h).unwrap_or([end; 2]);
     let places = ring(surface, h).enumerate();
-    places.filter(|(k, v)| *k < second || !wings.contains(v)).map(|(_, v)| spoke(v)).collect()
+    let places = places.filter(|(k, v)| *k < second || !wings.contains(v));
+    edges.extend(places.map(|(_, v)| spoke(v)));
 }
 
 fn take_longest<'s>(fan: &mut Vec<JudgedEdge<'s>>) -> JudgedEdge<'s> {
@@ -198,10 +204,9 @@ fn merges_looked_at(
         let ends = [surface.mesh.origin(h), surface.mesh.target(h)];
         around[ends[0] as usize].max(around[ends[1] as usize])
     };
-    let quiet: Vec<EdgeError> =
-        errors.iter().map(|&(h, _)| (h, score(h))).filter(|&(_, e)| e < limit).collect();
+    let quiet = errors.iter().map(|&(h, _)| (h, score(h))).filter(|&(_, e)| e < limit);
     // Neighbours exclude each other and the gate refuses some: look at more than are wanted.
-    let quiet = first_by(quiet, 6 * n_wanted + 32, |x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
+    let quiet = ranked(quiet, 6 * n_wanted + 32, First::Least);
     let tasks: Vec<_> = quiet.chunks(EDGES_A_TASK).collect();
     map(surface.host, tasks.len(), |task| {
         let edges = tasks[task].iter().map(|&(h, _)| h).filter(|&h| surface.can_collapse(h));

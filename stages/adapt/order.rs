@@ -6,7 +6,6 @@
 //! space-filling curve would make early rows wait for most of their source.
 
 use isospline_geometry::TriangleMesh;
-use std::collections::VecDeque;
 
 /// The same mesh with vertices and faces in front order; faces start at their lowest vertex.
 pub fn in_front_order(mesh: &TriangleMesh) -> TriangleMesh {
@@ -58,7 +57,7 @@ fn from_lowest(mut face: [u32; 3]) -> [u32; 3] {
     face
 }
 
-/// Vertex adjacency, rows ascending.
+/// Vertex adjacency; the neighbours of a vertex in ascending order of valence, then of row.
 struct Neighbours {
     first: Vec<u32>,
     list: Vec<u32>,
@@ -88,7 +87,17 @@ impl Neighbours {
             }
             first.push(list.len() as u32);
         }
-        Self { first, list }
+        let mut found = Self { first, list };
+        found.sort_by_valence();
+        found
+    }
+
+    fn sort_by_valence(&mut self) {
+        let Self { first, list } = self;
+        let valence = |v: u32| first[v as usize + 1] - first[v as usize];
+        for rows in first.windows(2) {
+            list[rows[0] as usize..rows[1] as usize].sort_unstable_by_key(|&v| (valence(v), v));
+        }
     }
 
     fn of_vertex(&self, v: u32) -> &[u32] {
@@ -135,18 +144,17 @@ fn far_end(neighbours: &Neighbours, seed: u32, seen: &mut [u32], stamp: &mut u32
 
 /// Appends the breadth-first front from `start`, neighbours in ascending order of valence.
 fn walk(neighbours: &Neighbours, start: u32, seen: &mut [u32], stamp: u32, order: &mut Vec<u32>) {
-    let valence = |v: &u32| neighbours.of_vertex(*v).len();
-    let mut queue = VecDeque::from([start]);
+    // What is appended and not yet passed is the queue.
+    let mut at = order.len();
+    order.push(start);
     seen[start as usize] = stamp;
-    let mut next = Vec::new();
-    while let Some(v) = queue.pop_front() {
-        order.push(v);
-        next.clear();
-        next.extend(neighbours.of_vertex(v).iter().copied().filter(|&w| seen[w as usize] != stamp));
-        next.sort_by_key(|w| (valence(w), *w));
-        for &w in &next {
-            seen[w as usize] = stamp;
-            queue.push_back(w);
+    while let Some(&v) = order.get(at) {
+        at += 1;
+        for &w in neighbours.of_vertex(v) {
+            if seen[w as usize] != stamp {
+                seen[w as usize] = stamp;
+                order.push(w);
+            }
         }
     }
 }

@@ -1,13 +1,11 @@
 //! The quartic of [TK, Eq. (9)] from few samples, of eight edges at a time.
 #![expect(clippy::inline_always, reason = "kernels must be compiled for the widest vectors whole")]
 
+use crate::sampled::{N_SAMPLES, Places};
 use crate::vertex::Vertex;
 use isospline_fitting::lanes::{Lanes, Mask, N, Vectors};
-use isospline_geometry::Vec3;
-use isospline_implicit::{Kernel, run_widest};
+use isospline_implicit::Kernel;
 
-/// Inner samples, at `t = 1/6 .. 5/6`: the network stage takes 15, five rank edges as well.
-pub(crate) const N_SAMPLES: usize = 5;
 /// Steps onto the curvature conditions; they converge by a digit or more a step.
 const CONDITION_STEPS: u32 = 4;
 /// Change of the unknowns, in chords, after which a further step would only polish.
@@ -35,26 +33,6 @@ impl Samples {
         let products = std::array::from_fn(|i| std::array::from_fn(|j| product(i, j)));
         Self { places, weights, products }
     }
-
-    /// Moves the samples of each edge, five an edge, to the quartic nearest to them that has
-    /// position, tangent plane and normal curvature of the surface at both ends; whether each edge
-    /// has a sound one.
-    pub(crate) fn move_to_quartics(
-        &self,
-        edges: &[[&Vertex; 2]],
-        points: &mut [[Vec3; N_SAMPLES]],
-    ) -> Vec<bool> {
-        run_widest(MoveToQuartics { samples: self, edges, points })
-    }
-
-    /// `t` of the points of eight curves.
-    #[inline(always)]
-    fn points(&self, curve: &[Vectors; 5]) -> [Vectors; N_SAMPLES] {
-        self.weights.map(|w| {
-            let weigh = |sum: Vectors, i: usize| sum + curve[i].times(Lanes::all(w[i]));
-            (0..5).fold(Vectors::ZERO, weigh)
-        })
-    }
 }
 
 fn bernstein_4(t: f64) -> [f64; 5] {
@@ -63,47 +41,52 @@ fn bernstein_4(t: f64) -> [f64; 5] {
     [s2 * s2, 4.0 * s2 * s * t, 6.0 * s2 * t2, 4.0 * s * t2 * t, t2 * t2]
 }
 
-struct MoveToQuartics<'a> {
-    samples: &'a Samples,
-    edges: &'a [[&'a Vertex; 2]],
-    points: &'a mut [[Vec3; N_SAMPLES]],
+/// Moves samples to the quartic nearest to them that has position, tangent plane and normal
+/// curvature of the surface at both ends; where each edge has a sound one.
+pub(crate) struct MoveToQuartics<'a> {
+    pub(crate) samples: &'a Samples,
+    /// Of eight edges each.
+    pub(crate) ends: &'a [[End; 2]],
+    pub(crate) places: &'a mut Places,
 }
 
 impl Kernel for MoveToQuartics<'_> {
-    type Output = Vec<bool>;
+    type Output = Vec<Mask>;
 
     #[inline(always)]
-    fn run(self) -> Vec<bool> {
-        let mut sound = Vec::with_capacity(self.edges.len());
-        for (edges, points) in self.edges.chunks(N).zip(self.points.chunks_mut(N)) {
-            // Idle lanes hold the last edge.
-            let last = edges.len() - 1;
-            let ends = [0, 1].map(|end| End::of(|k| edges[k.min(last)][end]));
-            let targets: [Vectors; N_SAMPLES] =
-                std::array::from_fn(|s| Vectors::of(|k| points[k.min(last)][s]));
-            let (curve, is_sound) = quartic(self.samples, &ends, &targets);
-            let moved = self.samples.points(&curve);
-            for (k, points) in points.iter_mut().enumerate() {
-                // Without a curve any place will do at which fields have values.
-                let place = |s: usize| if is_sound.0[k] { moved[s].get(k) } else { points[s] };
-                *points = std::array::from_fn(place);
+    fn run(self) -> Vec<Mask> {
+        let mut sound = Vec::with_capacity(self.ends.len());
+        for (group, ends) in self.ends.iter().enumerate() {
+            let mut targets = [Vectors::ZERO; N_SAMPLES];
+            for (s, target) in targets.iter_mut().enumerate() {
+                *target = self.places.row(group, s);
             }
-            sound.extend_from_slice(&is_sound.0[..edges.len()]);
+            let (curve, is_sound) = quartic(self.samples, ends, &targets);
+            for (s, (target, weights)) in targets.iter().zip(&self.samples.weights).enumerate() {
+                let mut point = Vectors::ZERO;
+                for (control, &weight) in curve.iter().zip(weights) {
+                    point = point + control.times(Lanes::all(weight));
+                }
+                // Without a curve any place will do at which fields have values.
+                self.places.set_row(group, s, is_sound.pick_vectors(point, *target));
+            }
+            sound.push(is_sound);
         }
         sound
     }
 }
 
 /// One end of eight edges.
-struct End {
-    position: Vectors,
+#[derive(Debug)]
+pub(crate) struct End {
+    pub(crate) position: Vectors,
     normal: Vectors,
     shape: [Lanes; 6],
 }
 
 impl End {
     #[inline(always)]
-    fn of<'v>(vertex: impl Fn(usize) -> &'v Vertex) -> Self {
+    pub(crate) fn of<'v>(vertex: impl Fn(usize) -> &'v Vertex) -> Self {
         let mut shape = [Lanes::all(0.0); 6];
         for k in 0..N {
             for (lanes, m) in shape.iter_mut().zip(vertex(k).shape) {
@@ -140,18 +123,16 @@ fn quartic(
     let chord = q4 - q0;
     let length = norm(chord);
     let chord = chord.over(length);
-    let tangent = |n: Vectors| {
-        let along = chord - n.times(n.dot(chord));
-        let size = norm(along);
-        let is_sound = size.is(Lanes::all(SHORTEST_TANGENT), |size, least| size <= least).not();
-        (along.over(size), is_sound)
-    };
     let normals = [ends[0].normal, ends[1].normal];
-    let [(t0, sound0), (t1, sound1)] = [tangent(normals[0]), tangent(normals[1])];
+    let (t0, sound0) = tangent(normals[0], chord);
+    let (t1, sound1) = tangent(normals[1], chord);
     let k = [length * ends[0].curvature(t0), length * ends[1].curvature(t1)];
     let (fit, is_regular) = Fit::new(samples, &[t0, t1]);
-    let targets = targets.map(|p| (p - q0).over(length));
-    let free = fit.solve(&pull(samples, [t0, t1], &targets, chord));
+    let mut along = *targets;
+    for point in &mut along {
+        *point = (*point - q0).over(length);
+    }
+    let free = fit.solve(&pull(samples, [t0, t1], &along, chord));
     let (x, is_met) = Conditions { k, normals, chord }.nearest(&fit, &free);
     let in_range = |l: Lanes| l.is(l, |l, _| (LENGTH_RANGE[0]..=LENGTH_RANGE[1]).contains(&l));
     let q1 = q0 + t0.times(length * x.l);
@@ -159,6 +140,15 @@ fn quartic(
     let q3 = q4 - t1.times(length * x.m);
     let is_sound = sound0.and(sound1).and(is_regular).and(is_met);
     ([q0, q1, q2, q3, q4], is_sound.and(in_range(x.l)).and(in_range(x.m)))
+}
+
+/// The direction of the chord in the tangent plane, and where there is one.
+#[inline(always)]
+fn tangent(normal: Vectors, chord: Vectors) -> (Vectors, Mask) {
+    let along = chord - normal.times(normal.dot(chord));
+    let size = norm(along);
+    let is_sound = size.is(Lanes::all(SHORTEST_TANGENT), |size, least| size <= least).not();
+    (along.over(size), is_sound)
 }
 
 #[inline(always)]

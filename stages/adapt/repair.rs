@@ -6,6 +6,7 @@ use crate::vertex::Vertex;
 use crate::{AdaptError, AdaptParams};
 use isospline_geometry::{HalfEdge, Vec3};
 use isospline_stage::{Counters, Ctx, map};
+use std::collections::VecDeque;
 
 /// An edit must leave at most this part of the badness, or no unfit face: smaller gains would let
 /// edits chase each other.
@@ -37,12 +38,13 @@ pub(crate) fn make_fit(
     ctx: &Ctx<'_>,
     surface: &mut SurfaceMesh<'_>,
     params: &AdaptParams,
+    search: &mut Search,
     counters: &mut Counters,
 ) -> Result<(), AdaptError> {
     let gate = Gate::new(params);
     let most_faces = (GROWTH * surface.mesh.face_count()).max(GROWTH_FLOOR);
     for round in 0..params.max_rounds {
-        let unfit = faces_above(surface, |s, f| gate.face(&s.corners(f)), 1.0);
+        let unfit = search.faces_above(surface, &gate, |s, f| gate.face(&s.corners(f)), 1.0);
         if unfit.is_empty() {
             return Ok(());
         }
@@ -53,18 +55,7 @@ pub(crate) fn make_fit(
             counters.count("unfit_faces_in", unfit.len() as u64);
         }
         ctx.host.progress(u64::from(round), u64::from(params.max_rounds))?;
-        let mut split_near = vec![false; surface.mesh.vertex_rows()];
-        for &face in &unfit {
-            let still =
-                |s: &SurfaceMesh<'_>| s.mesh.is_face(face) && gate.face(&s.corners(face)) > 1.0;
-            if !still(surface) {
-                continue;
-            }
-            match mends(surface, &gate, &[face]).pop().flatten() {
-                Some(mend) => drop(mend.make(surface, counters)),
-                None => split(surface, &gate, face, &mut split_near, counters),
-            }
-        }
+        fit_round(surface, &gate, &unfit, search, counters);
     }
     match worst_edge(surface, &gate) {
         None => Ok(()),
@@ -72,44 +63,133 @@ pub(crate) fn make_fit(
     }
 }
 
+/// Makes an edit of each of these faces that is still unfit, the worst first.
+fn fit_round(
+    surface: &mut SurfaceMesh<'_>,
+    gate: &Gate,
+    unfit: &[u32],
+    search: &mut Search,
+    counters: &mut Counters,
+) {
+    let is_unfit =
+        |s: &SurfaceMesh<'_>, face: u32| s.mesh.is_face(face) && gate.face(&s.corners(face)) > 1.0;
+    let mut split_near = vec![false; surface.mesh.vertex_rows()];
+    for batch in unfit.chunks(MENDS_AT_ONCE) {
+        let is_due = |&f: &u32| is_unfit(surface, f) && !search.is_vain(surface, f);
+        let due = batch.iter().copied().filter(is_due).collect();
+        let mut sought = Sought::of(surface, gate, due);
+        for &face in batch {
+            let known = sought.take(surface, face);
+            if !is_unfit(surface, face) {
+                continue;
+            }
+            let mend = match known {
+                Known::Mend(mend) => Some(mend),
+                Known::Nothing => None,
+                Known::Open if search.is_vain(surface, face) => None,
+                Known::Open => mend_of(surface, gate, face),
+            };
+            if let Some(mend) = mend {
+                mend.make(surface, counters);
+            } else {
+                search.note_vain(surface.now(), face);
+                split(surface, gate, face, &mut split_near, counters);
+            }
+        }
+    }
+}
+
 /// Flips, slides and collapses slivers and edges near the gate; nothing is split.
-pub(crate) fn soften(surface: &mut SurfaceMesh<'_>, params: &AdaptParams, counters: &mut Counters) {
+pub(crate) fn soften(
+    surface: &mut SurfaceMesh<'_>,
+    params: &AdaptParams,
+    search: &mut Search,
+    counters: &mut Counters,
+) {
     let gate = Gate::new(params);
     let cost = |s: &SurfaceMesh<'_>, f: u32| gate.face_with_quality(&s.corners(f));
     // What no edit mended stays so until something near it changes.
     let mut changed = vec![true; surface.mesh.vertex_rows()];
     for _ in 0..SOFT_ROUNDS {
         let before = std::mem::replace(&mut changed, vec![false; surface.mesh.vertex_rows()]);
-        for batch in faces_above(surface, cost, SOFT).chunks(MENDS_AT_ONCE) {
+        for batch in search.faces_above(surface, &gate, cost, SOFT).chunks(MENDS_AT_ONCE) {
             let is_due = |s: &SurfaceMesh<'_>, changed: &[bool], face: u32| {
                 let is_new = |&v: &u32| before[v as usize] || changed[v as usize];
-                s.mesh.is_face(face) && cost(s, face) > SOFT && s.mesh.face(face).iter().any(is_new)
+                s.mesh.is_face(face) && s.mesh.face(face).iter().any(is_new) && cost(s, face) > SOFT
             };
-            let time = surface.now();
-            let due: Vec<u32> =
-                batch.iter().copied().filter(|&f| is_due(surface, &changed, f)).collect();
-            let mut mends = mends(surface, &gate, &due).into_iter().zip(due).peekable();
+            let due = batch.iter().copied().filter(|&f| is_due(surface, &changed, f)).collect();
+            let mut sought = Sought::of(surface, &gate, due);
             for &face in batch {
-                let mend = mends.next_if(|&(_, of)| of == face).map(|(mend, _)| mend);
+                let known = sought.take(surface, face);
                 if !is_due(surface, &changed, face) {
                     continue;
                 }
-                let mend = match mend {
-                    Some(mend) if is_as_at(surface, time, face) => mend,
-                    _ => self::mends(surface, &gate, &[face]).pop().flatten(),
+                let mend = match known {
+                    Known::Mend(mend) => Some(mend),
+                    Known::Nothing => None,
+                    Known::Open => mend_of(surface, &gate, face),
                 };
-                if let Some(center) = mend.map(|mend| mend.make(surface, counters)) {
-                    changed[center as usize] = true;
-                    surface.mesh.neighbours(center).for_each(|v| changed[v as usize] = true);
-                }
+                let Some(mend) = mend else {
+                    search.note_vain(surface.now(), face);
+                    continue;
+                };
+                let center = mend.make(surface, counters);
+                changed[center as usize] = true;
+                surface.mesh.neighbours(center).for_each(|v| changed[v as usize] = true);
             }
         }
     }
 }
 
-/// Faces above a limit, worst first.
+/// What one round of the repair knows from those before it, whose limit was not higher.
+#[derive(Debug, Default)]
+pub(crate) struct Search {
+    /// When an edit of each face was last sought in vain; 0 is never.
+    vain: Vec<u32>,
+    /// When all faces were known; 0 is before all.
+    complete: u32,
+    /// The faces above the limit then, ascending.
+    above: Vec<u32>,
+}
+
+impl Search {
+    fn note_vain(&mut self, time: u32, face: u32) {
+        let n_faces = self.vain.len().max(face as usize + 1);
+        self.vain.resize(n_faces, 0);
+        self.vain[face as usize] = time;
+    }
+
+    /// Whether an edit was sought and nothing that it would depend on has changed since.
+    fn is_vain(&self, surface: &SurfaceMesh<'_>, face: u32) -> bool {
+        let time = self.vain.get(face as usize).copied().unwrap_or(0);
+        time > 0 && is_as_at(surface, time, face)
+    }
+
+    /// Faces whose `cost`, at most [`Gate::face_with_quality`], is above a limit, worst first. Only
+    /// those that were edited or were above before can be.
+    fn faces_above(
+        &mut self,
+        surface: &SurfaceMesh<'_>,
+        gate: &Gate,
+        cost: impl Fn(&SurfaceMesh<'_>, u32) -> f64 + Sync,
+        limit: f64,
+    ) -> Vec<u32> {
+        let may_be =
+            |f: u32| !surface.is_as_at(self.complete, f) || self.above.binary_search(&f).is_ok();
+        let above = faces_above(surface, gate, may_be, cost, limit);
+        self.above.clone_from(&above);
+        self.above.sort_unstable();
+        self.complete = surface.now();
+        above
+    }
+}
+
+/// Faces that `may_be` above a limit and whose `cost`, at most [`Gate::face_with_quality`], is, worst
+/// first.
 fn faces_above(
     surface: &SurfaceMesh<'_>,
+    gate: &Gate,
+    may_be: impl Fn(u32) -> bool + Sync,
     cost: impl Fn(&SurfaceMesh<'_>, u32) -> f64 + Sync,
     limit: f64,
 ) -> Vec<u32> {
@@ -117,7 +197,12 @@ fn faces_above(
     let mut above: Vec<(f64, u32)> = map(surface.host, rows.div_ceil(FACES_A_TASK), |task| {
         let last = ((task + 1) * FACES_A_TASK).min(rows);
         let faces = (task * FACES_A_TASK..last).map(|f| f as u32);
-        let costs = faces.filter(|&f| surface.mesh.is_face(f)).map(|f| (cost(surface, f), f));
+        let may_be = |&f: &u32| {
+            surface.mesh.is_face(f)
+                && may_be(f)
+                && !gate.is_clearly_below(&surface.corners(f), limit)
+        };
+        let costs = faces.filter(may_be).map(|f| (cost(surface, f), f));
         costs.filter(|&(c, _)| c > limit).collect::<Vec<_>>()
     })
     .concat();
@@ -157,6 +242,43 @@ impl Mend {
     }
 }
 
+/// Edits sought together, before any of them is made.
+struct Sought {
+    time: u32,
+    /// Of each face, in their order.
+    mends: VecDeque<(u32, Option<Mend>)>,
+}
+
+impl Sought {
+    fn of(surface: &SurfaceMesh<'_>, gate: &Gate, faces: Vec<u32>) -> Self {
+        let found = mends(surface, gate, &faces);
+        Self { time: surface.now(), mends: faces.into_iter().zip(found).collect() }
+    }
+
+    /// What was found for the next face, if it is this one.
+    fn take(&mut self, surface: &SurfaceMesh<'_>, face: u32) -> Known {
+        match self.mends.pop_front_if(|(next, _)| *next == face) {
+            Some((_, mend)) if is_as_at(surface, self.time, face) => {
+                mend.map_or(Known::Nothing, Known::Mend)
+            }
+            _ => Known::Open,
+        }
+    }
+}
+
+/// What is known of a face.
+enum Known {
+    Mend(Mend),
+    /// No edit helps.
+    Nothing,
+    /// Nobody has looked, or something has changed that its edit depends on.
+    Open,
+}
+
+fn mend_of(surface: &SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<Mend> {
+    mends(surface, gate, &[face]).pop().flatten()
+}
+
 /// For each face the first edit that helps, as if it were the only one; on the host's threads.
 fn mends(surface: &SurfaceMesh<'_>, gate: &Gate, faces: &[u32]) -> Vec<Option<Mend>> {
     let tasks: Vec<_> = faces.chunks(MENDS_A_TASK).collect();
@@ -191,8 +313,15 @@ fn halves(face: u32) -> [HalfEdge; 3] {
 fn flip(surface: &SurfaceMesh<'_>, gate: &Gate, face: u32) -> Option<Mend> {
     let mut best: Option<(f64, HalfEdge)> = None;
     for h in halves(face) {
-        let Some([before, after]) = surface.flip_cost(gate, h) else { continue };
-        if after < GAIN * before && best.is_none_or(|(least, _)| after < least) {
+        let Some([before, after]) = surface.faces_of_flip(h) else { continue };
+        let worst =
+            |[x, y]: [[&Vertex; 3]; 2]| gate.face_with_quality(&x).max(gate.face_with_quality(&y));
+        let limit = GAIN * worst(before);
+        if !after.iter().all(|face| gate.is_below(face, limit)) || !surface.mesh.can_flip(h) {
+            continue;
+        }
+        let after = worst(after);
+        if after < limit && best.is_none_or(|(least, _)| after < least) {
             best = Some((after, h));
         }
     }
@@ -294,7 +423,7 @@ fn split(
 
 /// The error that names the worst edge of an unfit face, if there is one.
 fn worst_edge(surface: &SurfaceMesh<'_>, gate: &Gate) -> Option<AdaptError> {
-    let unfit = faces_above(surface, |s, f| gate.face(&s.corners(f)), 1.0);
+    let unfit = faces_above(surface, gate, |_| true, |s, f| gate.face(&s.corners(f)), 1.0);
     let badness = |h: HalfEdge| {
         let [p, q] = surface.ends(h);
         gate.edge(p, q)

@@ -26,6 +26,8 @@ pub(crate) struct SurfaceMesh<'a> {
     pub(crate) moves: Vec<u32>,
     /// When each face was last edited, or a corner of it moved.
     edited: Vec<u32>,
+    /// The last of those times of the faces about each vertex.
+    fan_edited: Vec<u32>,
     /// Edits so far, and one.
     now: u32,
 }
@@ -37,8 +39,9 @@ impl<'a> SurfaceMesh<'a> {
         let vertices = vertices_at(field, host, &mesh.positions)?;
         let moves = vec![0; vertices.len()];
         let (measure, mesh) = (Measure::Paper, EditMesh::new(mesh)?);
-        let (edited, now) = (vec![1; mesh.face_rows()], 1);
-        Ok(Self { field, host, measure, diagonal, mesh, vertices, moves, edited, now })
+        let (edited, fan_edited) = (vec![1; mesh.face_rows()], vec![1; mesh.vertex_rows()]);
+        let now = 1;
+        Ok(Self { field, host, measure, diagonal, mesh, vertices, moves, edited, fan_edited, now })
     }
 
     /// Keeps what `other` is now: without new memory, whose first touch costs more than the copy.
@@ -47,6 +50,7 @@ impl<'a> SurfaceMesh<'a> {
         self.vertices.clone_from(&other.vertices);
         self.moves.clone_from(&other.moves);
         self.edited.clone_from(&other.edited);
+        self.fan_edited.clone_from(&other.fan_edited);
         self.now = other.now;
     }
 
@@ -56,6 +60,7 @@ impl<'a> SurfaceMesh<'a> {
         *self = kept;
         self.now = now;
         self.edited.fill(now);
+        self.fan_edited.fill(now);
     }
 
     /// The present as a time; later edits come after it.
@@ -70,7 +75,7 @@ impl<'a> SurfaceMesh<'a> {
 
     /// The same of all faces about a vertex.
     pub(crate) fn fan_is_as_at(&self, time: u32, vertex: u32) -> bool {
-        self.mesh.spokes(vertex).all(|h| self.is_as_at(time, h.face()))
+        self.fan_edited[vertex as usize] <= time
     }
 
     pub(crate) fn at(&self, vertex: u32) -> &Vertex {
@@ -128,8 +133,11 @@ impl<'a> SurfaceMesh<'a> {
 
     /// Worst of the faces about a vertex.
     pub(crate) fn fan_cost(&self, gate: &Gate, vertex: u32) -> f64 {
-        let faces = self.mesh.spokes(vertex).map(HalfEdge::face);
-        faces.map(|f| gate.face_with_quality(&self.corners(f))).fold(0.0, f64::max)
+        self.mesh.spokes(vertex).fold(0.0, |worst: f64, h| {
+            let corners = self.corners(h.face());
+            let is_less = gate.is_clearly_below(&corners, worst);
+            if is_less { worst } else { worst.max(gate.face_with_quality(&corners)) }
+        })
     }
 
     /// Whether all faces about a vertex would be better than `limit` if it were `moved`.
@@ -153,31 +161,34 @@ impl<'a> SurfaceMesh<'a> {
     /// The faces about a vertex are edited now.
     fn note_fan(&mut self, vertex: u32) {
         self.now += 1;
-        for h in self.mesh.spokes(vertex) {
-            self.edited[h.face() as usize] = self.now;
+        let Self { mesh, edited, fan_edited, now, .. } = self;
+        for h in mesh.spokes(vertex) {
+            edited[h.face() as usize] = *now;
+            for v in mesh.face(h.face()) {
+                fan_edited[v as usize] = *now;
+            }
         }
     }
 
-    /// Turns an edge; the caller has asked [`Self::flip_cost`]. The half-edge that it is now.
+    /// Turns an edge; the caller has asked [`EditMesh::can_flip`]. The half-edge that it is now.
     pub(crate) fn flip(&mut self, h: HalfEdge) -> HalfEdge {
         let turned = self.mesh.flip(h);
         let other = self.mesh.opposite(turned).expect("invariant: it has two faces");
         self.now += 1;
         for face in [turned.face(), other.face()] {
             self.edited[face as usize] = self.now;
+            for v in self.mesh.face(face) {
+                self.fan_edited[v as usize] = self.now;
+            }
         }
         turned
     }
 
-    /// Worst of the two faces beside an edge, now and after a flip; `None` if it cannot flip.
-    pub(crate) fn flip_cost(&self, gate: &Gate, h: HalfEdge) -> Option<[f64; 2]> {
-        if !self.mesh.can_flip(h) {
-            return None;
-        }
+    /// The two faces beside an edge, now and after a flip.
+    pub(crate) fn faces_of_flip(&self, h: HalfEdge) -> Option<[[[&Vertex; 3]; 2]; 2]> {
         let [a, b] = self.ends(h);
         let [c, d] = self.wings(h)?.map(|v| self.at(v));
-        let worst = |x, y| gate.face_with_quality(x).max(gate.face_with_quality(y));
-        Some([worst(&[a, b, c], &[b, a, d]), worst(&[d, c, a], &[c, d, b])])
+        Some([[[a, b, c], [b, a, d]], [[d, c, a], [c, d, b]]])
     }
 
     /// Whether the ends of `h` can become `merged` and all faces left about them would be better
@@ -231,6 +242,7 @@ impl<'a> SurfaceMesh<'a> {
         self.vertices.push(middle);
         self.moves.push(0);
         self.edited.resize(self.mesh.face_rows(), 0);
+        self.fan_edited.push(0);
         self.note_fan(vertex);
         Some(vertex)
     }
@@ -247,7 +259,7 @@ impl<'a> SurfaceMesh<'a> {
         let mut kept = self.mesh.spokes(vertex).filter(|h| !removed.contains(&h.face()));
         let is_worse = |h: HalfEdge| {
             let (p, q) = (self.mesh.target(h), self.mesh.origin(h.prev()));
-            gate.face_with_quality(&[moved, self.at(p), self.at(q)]) >= limit
+            !gate.is_below(&[moved, self.at(p), self.at(q)], limit)
         };
         // No face is better than 0.
         limit > 0.0 && !kept.any(is_worse)
