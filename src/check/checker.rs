@@ -1,7 +1,7 @@
 //! The whole check, figure by figure.
 
 use crate::curvature;
-use crate::distance::{GRID, first_order};
+use crate::distance::{FaceFigures, GRID, UnfitFace, first_order};
 use crate::edges::{self, Edges};
 use crate::faces::{self, Faces, count_not_finite};
 use crate::grid::Grid;
@@ -41,17 +41,41 @@ impl std::fmt::Debug for Job<'_> {
     }
 }
 
+/// A report, and what single faces showed.
+#[derive(Debug)]
+pub struct Checked {
+    /// The figures of all faces together, and the verdict.
+    pub report: CheckReport,
+    faces: Vec<FaceFigures>,
+}
+
+impl Checked {
+    /// The faces whose patch faces inward at a sample, or is farther from the surface than `limit`,
+    /// in model units.
+    pub fn unfit_faces(&self, limit: f64) -> Vec<UnfitFace> {
+        let is_unfit = |figures: &FaceFigures| figures.flipped || figures.max > limit;
+        let unfit = (0..).zip(&self.faces).filter(|(_, figures)| is_unfit(figures));
+        unfit.map(|(face, figures)| UnfitFace { face, folds: figures.flipped }).collect()
+    }
+}
+
 /// Measures all figures and holds them against the limits.
 ///
 /// The report depends on the job alone, not on the threads that `for_each` lends.
 pub fn check(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
-    let mut report = measure(job, for_each);
-    report.failures = verdict::failures(&report, job);
-    report.pass = report.failures.is_empty();
-    report
+    check_faces(job, for_each).report
 }
 
-fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
+/// [`check`], with what single faces showed.
+pub fn check_faces(job: &Job<'_>, for_each: ForEach<'_>) -> Checked {
+    let mut checked = measure(job, for_each);
+    let report = &mut checked.report;
+    report.failures = verdict::failures(report, job);
+    report.pass = report.failures.is_empty();
+    checked
+}
+
+fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> Checked {
     let Job { surface, field, .. } = *job;
     let at_vertices = vertex_jets(surface, field, for_each);
     let (grid, quadrature) = (&Grid::new(GRID), &Quadrature::new());
@@ -78,7 +102,7 @@ fn measure(job: &Job<'_>, for_each: ForEach<'_>) -> CheckReport {
     for block in blocks {
         edges.append(block);
     }
-    Parts { topology, faces, edges, worst, at_vertices, grid }.report(job)
+    Parts { topology, faces, edges, worst, at_vertices, grid }.checked(job)
 }
 
 /// What the parts of the check found, in model units.
@@ -93,7 +117,7 @@ struct Parts<'a> {
 
 impl Parts<'_> {
     /// The figures, relative where the report wants them so; no verdict yet.
-    fn report(mut self, job: &Job<'_>) -> CheckReport {
+    fn checked(mut self, job: &Job<'_>) -> Checked {
         let not_finite = self.not_finite(job.surface);
         let off_surface = self.at_vertices.iter().map(first_order).fold(0.0, worse);
         let Self { topology, faces, worst, .. } = self;
@@ -103,7 +127,7 @@ impl Parts<'_> {
         let distance = distances.summary(surface, self.grid);
         let curvature = curvature::percentiles(jumps);
         let diagonal = surface.diagonal();
-        CheckReport {
+        let report = CheckReport {
             faces: surface.faces().len() as u64,
             vertices: surface.vertices().len() as u64,
             euler_characteristic: topology.euler_characteristic(surface),
@@ -137,7 +161,8 @@ impl Parts<'_> {
             worst_normal: distance.worst_normal,
             pass: false,
             failures: Vec::new(),
-        }
+        };
+        Checked { report, faces: distances.faces }
     }
 
     fn not_finite(&self, surface: &Surface<'_>) -> u64 {

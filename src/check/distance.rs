@@ -4,11 +4,10 @@
 use crate::evaluate::Stencil;
 use crate::grid::Grid;
 use crate::lanes::{LANES, Lane, dot, normal, vector};
-use crate::lent_threads::{ForEach, blocks};
 use crate::octet::{Curve, Octet, PatchPoints};
 use crate::report::{Place, worse};
 use crate::slope::{Slope, Slopes, Steepest};
-use crate::surface::{Net, Surface};
+use crate::surface::Surface;
 use isospline_implicit::{BLOCK, Field, Jet1, Kernel, run_widest};
 
 /// Steps a side of the sample grid: 153 points a patch.
@@ -20,7 +19,7 @@ pub(crate) struct FaceFigures {
     pub(crate) max: f64,
     /// Grid index of the largest distance.
     pub(crate) worst: u32,
-    flipped: bool,
+    pub(crate) flipped: bool,
 }
 
 /// What patches one after another show together.
@@ -84,38 +83,6 @@ pub struct UnfitFace {
     pub face: u32,
     /// Whether its patch faces inward at a sample; if not it is too far from the surface.
     pub folds: bool,
-}
-
-/// The faces whose patch faces inward at a sample, or is farther from the surface than `limit`,
-/// in model units.
-pub fn unfit_faces(
-    surface: &Surface<'_>,
-    field: &dyn Field,
-    limit: f64,
-    for_each: ForEach<'_>,
-) -> Vec<UnfitFace> {
-    let is_unfit = |figures: &FaceFigures| figures.flipped || figures.max > limit;
-    let faces = (0..).zip(face_figures(surface, field, for_each));
-    let unfit = faces.filter(|(_, figures)| is_unfit(figures));
-    unfit.map(|(face, figures)| UnfitFace { face, folds: figures.flipped }).collect()
-}
-
-fn face_figures(
-    surface: &Surface<'_>,
-    field: &dyn Field,
-    for_each: ForEach<'_>,
-) -> Vec<FaceFigures> {
-    let grid = Grid::new(GRID);
-    let blocks = blocks(for_each, surface.faces().len(), |range| {
-        let (mut octet, mut sampler) = (Octet::new(), Sampler::new(field, &grid));
-        let nets: Vec<Net> = range.map(|f| surface.net(f)).collect();
-        for nets in nets.chunks(LANES) {
-            octet.set(nets);
-            sampler.enter(&octet, nets.len());
-        }
-        sampler.found.faces
-    });
-    blocks.concat()
 }
 
 /// The place of `stencil` on face `f`.
@@ -331,15 +298,21 @@ impl Tally {
 mod tests {
     use super::*;
     use crate::box_spline::{Knots, torus};
-    use crate::lent_threads::on_this_thread;
+    use crate::surface::Net;
     use isospline_geometry::Vec3;
 
     #[test]
     fn samples_side_by_side_show_what_single_points_show() {
         // 30 patches: the last ones do not fill an octet.
         let (surface, field, grid) = (Knots::surface(5, 3), torus(), Grid::new(GRID));
-        let found = face_figures(&surface, &field, &on_this_thread);
-        assert_eq!(found.len(), 30);
+        let (mut octet, mut sampler) = (Octet::new(), Sampler::new(&field, &grid));
+        let nets: Vec<Net> = (0..30).map(|f| surface.net(f)).collect();
+        for nets in nets.chunks(LANES) {
+            octet.set(nets);
+            sampler.enter(&octet, nets.len());
+        }
+        let found = sampler.found.faces;
+        assert_eq!(found.len(), surface.faces().len());
         for (f, found) in found.iter().enumerate() {
             let net = surface.net(f);
             let distance = |i: usize| first_order(&field.gradient(grid.stencil(i).point(&net)));

@@ -35,8 +35,8 @@ mod box_spline;
 #[cfg(test)]
 mod seeded_defects;
 
-pub use checker::{Job, check};
-pub use distance::{UnfitFace, unfit_faces};
+pub use checker::{Checked, Job, check, check_faces};
+pub use distance::UnfitFace;
 pub use lent_threads::{ForEach, on_this_thread};
 pub use params::{CheckParams, DEFAULT_ERROR, Expected};
 pub use report::{CheckReport, Component, EdgeDefects, Place};

@@ -9,7 +9,9 @@ use crate::stages;
 use crate::tolerance::{Found, Round, Step, next};
 use isospline_artifact::kinds::{Mesh, Patches, PatchesView};
 use isospline_artifact::{Container, MemoryStore, StoreError};
-use isospline_check::{CheckParams, CheckReport, Expected, Job, Surface, SurfaceError};
+use isospline_check::{
+    CheckParams, CheckReport, Checked, Expected, Job, Surface, SurfaceError, check_faces,
+};
 use isospline_geometry::{Aabb, TriangleMesh};
 use isospline_implicit::{Field, InsideError, Oriented};
 use isospline_network::Method;
@@ -290,6 +292,17 @@ impl Conversion<'_> {
     /// # Errors
     /// [`ConvertError::Surface`] if the patches do not fit together.
     pub fn check(&self, limits: &CheckParams) -> Result<CheckReport, ConvertError> {
+        let threads = RunOptions::default().threads;
+        self.measured(limits, threads, |_, checked| checked.report)
+    }
+
+    /// What `take` makes of the surface and what its check found.
+    fn measured<T>(
+        &self,
+        limits: &CheckParams,
+        threads: usize,
+        take: impl FnOnce(&Surface<'_>, Checked) -> T,
+    ) -> Result<T, ConvertError> {
         let surface = Surface::from_patches(&self.patches()?)?;
         let job = Job {
             surface: &surface,
@@ -298,13 +311,14 @@ impl Conversion<'_> {
             params: limits,
             repairs: self.repairs(),
         };
-        let threads = Threads::new(RunOptions::default().threads);
-        Ok(isospline_check::check(&job, &|n, body| threads.for_each(n, body)))
+        let threads = Threads::new(threads);
+        Ok(take(&surface, check_faces(&job, &|n, body| threads.for_each(n, body))))
     }
 
     fn unfit(&self, method: Method, threads: usize) -> Result<Vec<Unfit>, ConvertError> {
-        let surface = Surface::from_patches(&self.patches()?)?;
-        Ok(unfit(&surface, &self.field, self.expected.tolerance, method, threads))
+        self.measured(&CheckParams::default(), threads, |surface, checked| {
+            unfit(surface, &self.field, &checked, self.expected.tolerance, method)
+        })
     }
 
     fn found(&self, tolerance: f64) -> Result<Found, ConvertError> {

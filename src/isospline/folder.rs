@@ -10,15 +10,17 @@ pub use rounds::{ROUNDS_NOTE, Rounds};
 use crate::config::ModelFile;
 use crate::{Model, ModelError, stages};
 use isospline_artifact::kinds::{Mesh, Patches, Topology, TopologyProof};
-use isospline_artifact::{Artifact, Container, Durability, FolderStore, Store, StoreError};
-use isospline_check::{CheckParams, CheckReport, Expected, Job, Surface, SurfaceError};
+use isospline_artifact::{Artifact, Container, Durability, FolderStore, Key, Store, StoreError};
+use isospline_check::{
+    CheckParams, CheckReport, Checked, Expected, Job, Surface, SurfaceError, check_faces,
+};
 use isospline_pipeline::{
     Event, Graph, ModelKey, NodeStatus, Pipeline, Provenance, Registry, RunError, RunOptions,
     RunReport, Scene, Threads, read_provenance,
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Name of the canonical model file.
 pub const MODEL_NOTE: &str = "model.toml";
@@ -55,6 +57,8 @@ pub struct ModelFolder {
     store: FolderStore,
     registry: Registry,
     graph: Graph,
+    /// The check of the surface that was made last, with the content of its patches.
+    last_check: Mutex<Option<(Key, CheckReport)>>,
 }
 
 impl ModelFolder {
@@ -63,7 +67,7 @@ impl ModelFolder {
         let registry = stages::registry();
         let graph = stages::graph(&registry, &model.file.stages, model.base_mesh.as_ref());
         let (key, store) = (model.key(), FolderStore::new(path, durability));
-        let mut folder = Self { model, key, store, registry, graph };
+        let mut folder = Self { model, key, store, registry, graph, last_check: Mutex::default() };
         if let Ok(faces) = folder.noted_faces()
             && let Ok(remedies) = folder.noted_remedies(faces)
         {
@@ -168,11 +172,17 @@ impl ModelFolder {
         Some(self.store().open(&self.registry.artifact_name(node)))
     }
 
-    /// Measures the finished surface on as many threads.
+    /// Measures the finished surface on as many threads, unless [`ModelFolder::run`] has done so.
     ///
     /// # Errors
     /// [`FolderError::Store`], [`FolderError::Surface`].
     pub fn check(&self, threads: usize) -> Result<CheckReport, FolderError> {
+        let last = self.last_check.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some((content, report)) = last
+            && content == self.patches()?.content()
+        {
+            return Ok(report);
+        }
         self.check_against(&self.model.file.check, threads)
     }
 
@@ -181,6 +191,16 @@ impl ModelFolder {
         limits: &CheckParams,
         threads: usize,
     ) -> Result<CheckReport, FolderError> {
+        self.measured(limits, threads, |_, checked| checked.report)
+    }
+
+    /// What `take` makes of the finished surface and what its check found.
+    fn measured<T>(
+        &self,
+        limits: &CheckParams,
+        threads: usize,
+        take: impl FnOnce(&Surface<'_>, Checked) -> T,
+    ) -> Result<T, FolderError> {
         let container = self.patches()?;
         let surface = Surface::from_patches(&container.view::<Patches>()?)?;
         let job = Job {
@@ -191,8 +211,8 @@ impl ModelFolder {
             repairs: self.repairs()?,
         };
         let threads = Threads::new(threads);
-        let check = || isospline_check::check(&job, &|n, body| threads.for_each(n, body));
-        Ok(threads.within(check))
+        let check = || check_faces(&job, &|n, body| threads.for_each(n, body));
+        Ok(take(&surface, threads.within(check)))
     }
 
     /// Counters of every fallback that a stage took, as `stage.name`.

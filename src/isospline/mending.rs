@@ -14,12 +14,11 @@
 
 use crate::config::StageParams;
 use isospline_adapt::Improve;
-use isospline_check::{DEFAULT_ERROR, Surface, unfit_faces};
+use isospline_check::{Checked, DEFAULT_ERROR, Surface};
 use isospline_fitting::shape::second_fundamental_form;
 use isospline_geometry::Vec3;
 use isospline_implicit::Field;
 use isospline_network::Method;
-use isospline_pipeline::Threads;
 use serde::{Deserialize, Serialize};
 
 /// Middle of a face, model units.
@@ -144,13 +143,12 @@ pub(crate) fn applies(params: &StageParams, is_imported: bool) -> bool {
 pub(crate) fn unfit(
     surface: &Surface<'_>,
     field: &dyn Field,
+    checked: &Checked,
     tolerance: Option<f64>,
     method: Method,
-    threads: usize,
 ) -> Vec<Unfit> {
-    let threads = Threads::new(threads);
     let limit = tolerance.unwrap_or(DEFAULT_ERROR) * surface.diagonal();
-    let found = unfit_faces(surface, field, limit, &|n, body| threads.for_each(n, body));
+    let found = checked.unfit_faces(limit);
     let may_have_other_curves = method == Method::Normal && !found.is_empty();
     let has_developable = may_have_other_curves && has_developable_parts(surface, field);
     let unfit = found.into_iter().map(|found| {

@@ -3,14 +3,13 @@
 //! What was unfit is kept beside the artifacts after each surface: a run that was stopped goes on
 //! where it stopped, and one that ended finds its artifacts fresh.
 
-use super::ModelFolder;
+use super::{FolderError, ModelFolder};
 use crate::mending::{Mending, Remedies, Unfit, applies, unfit};
 use isospline_artifact::StoreError;
-use isospline_artifact::kinds::Patches;
-use isospline_check::Surface;
 use isospline_pipeline::{Event, RunError, RunOptions, RunReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::PoisonError;
 
 /// Name of the note of the unfit faces.
 pub const MENDS_NOTE: &str = "mends.json";
@@ -75,17 +74,23 @@ impl ModelFolder {
     }
 
     fn unfit(&self, threads: usize) -> Result<Vec<Unfit>, RunError> {
-        let container = self.patches()?;
-        let patches = container.view::<Patches>()?;
-        // Of patches that do not fit together the check tells what is wrong.
-        Ok(Surface::from_patches(&patches).map_or_else(
-            |_| Vec::new(),
-            |surface| {
-                let tolerance = self.model.file.target.tolerance(surface.diagonal());
-                let method = self.model.file.stages.network.method;
-                unfit(&surface, &self.model.field, tolerance, method, threads)
-            },
-        ))
+        let file = &self.model.file;
+        let measured = self.measured(&file.check, threads, |surface, checked| {
+            let tolerance = file.target.tolerance(surface.diagonal());
+            let method = file.stages.network.method;
+            (unfit(surface, &self.model.field, &checked, tolerance, method), checked.report)
+        });
+        match measured {
+            Ok((unfit, report)) => {
+                let content = self.patches()?.content();
+                *self.last_check.lock().unwrap_or_else(PoisonError::into_inner) =
+                    Some((content, report));
+                Ok(unfit)
+            }
+            Err(FolderError::Store(error)) => Err(error.into()),
+            // Of patches that do not fit together the check tells what is wrong.
+            Err(_) => Ok(Vec::new()),
+        }
     }
 
     fn noted_mending(&self, faces: u32) -> Result<Mending, StoreError> {
