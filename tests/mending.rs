@@ -90,7 +90,7 @@ fn beside_planes_and_cylinders_folds_go_without_a_larger_error() {
 
 #[test]
 fn in_the_fit_of_the_paper_needles_that_fold_are_merged_and_what_is_too_far_is_split() {
-    let needle = ("smax(x^2 + y^2 - 0.5, z^2 - 0.6, 0.3)", "1.0", 1000, "merged");
+    let needle = ("smax(x^2 + y^2 - 0.5, z^2 - 0.6, 0.3)", "1.0", 2000, "merged");
     let too_far = ("smax(smax(abs(x), abs(y), 0.4), abs(z), 0.4) - 1", "1.5", 600, "split");
     for (formula, half, faces, remedy) in [needle, too_far] {
         let sandbox = Sandbox::new();

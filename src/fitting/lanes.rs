@@ -189,6 +189,24 @@ impl Vectors {
         let ([x, y, z], [a, b, c]) = (self.0, other.0);
         x * a + y * b + z * c
     }
+
+    /// The lengths.
+    #[inline(always)]
+    pub fn norm(self) -> Lanes {
+        self.dot(self).map(f64::sqrt)
+    }
+
+    /// The quadratic forms of symmetric matrices, given by their entries xx, xy, xz, yy, yz, zz.
+    #[inline(always)]
+    pub fn form(self, m: &[Lanes; 6]) -> Lanes {
+        let [x, y, z] = self.0;
+        let image = Self([
+            m[0] * x + m[1] * y + m[2] * z,
+            m[1] * x + m[3] * y + m[4] * z,
+            m[2] * x + m[4] * y + m[5] * z,
+        ]);
+        self.dot(image)
+    }
 }
 
 impl Add for Vectors {

@@ -83,14 +83,14 @@ impl Frame {
     fn new<'e>(edge: impl Fn(usize) -> &'e Ends) -> (Self, Mask) {
         let [origin, end] = [0, 1].map(|end| Vectors::of(|k| edge(k).points[end]));
         let normals = [0, 1].map(|end| Vectors::of(|k| edge(k).normals[end]));
-        let chord = norm(end - origin);
+        let chord = (end - origin).norm();
         let q4 = (end - origin).over(chord);
         let mut is_framed = Mask([true; N]);
         let mut tangents = [Vectors::ZERO; 2];
         let mut curvatures = [Lanes::all(0.0); 2];
         for end in 0..2 {
             let along = q4 - normals[end].times(q4.dot(normals[end]));
-            let size = norm(along);
+            let size = along.norm();
             is_framed = is_framed.and(size.is(chord, |size, _| size > SHORTEST_TANGENT));
             tangents[end] = along.over(size);
             let mut shape = [Lanes::all(0.0); 6];
@@ -99,7 +99,7 @@ impl Frame {
                     lanes.0[k] = m;
                 }
             }
-            curvatures[end] = chord * curvature(&shape, tangents[end]);
+            curvatures[end] = chord * tangents[end].form(&shape);
         }
         (Self { origin, chord, q4, normals, tangents, curvatures }, is_framed)
     }
@@ -113,23 +113,6 @@ impl Frame {
             4.0 * x.m * x.m * k1 - 3.0 * (x.q - self.q4).dot(self.normals[1]),
         ]
     }
-}
-
-/// `t^T M t`.
-#[inline(always)]
-fn curvature(m: &[Lanes; 6], t: Vectors) -> Lanes {
-    let [x, y, z] = t.0;
-    let mt = Vectors([
-        m[0] * x + m[1] * y + m[2] * z,
-        m[1] * x + m[3] * y + m[4] * z,
-        m[2] * x + m[4] * y + m[5] * z,
-    ]);
-    t.dot(mt)
-}
-
-#[inline(always)]
-fn norm(v: Vectors) -> Lanes {
-    v.dot(v).map(f64::sqrt)
 }
 
 /// Sums over the samples of the polynomials 1, 2, 3 times what is known of a curve less the target.
@@ -228,7 +211,7 @@ impl<'a> Problem<'a> {
         let (x, residual) = self.restored(x);
         let in_range = |x: Lanes| x.is(x, |x, _| (LENGTH_RANGE[0]..=LENGTH_RANGE[1]).contains(&x));
         let is_met = residual.is(residual, |r, _| r <= CONDITION_TOLERANCE);
-        let shift = norm(x.q - free.q);
+        let shift = (x.q - free.q).norm();
         let is_near = shift.is(shift, |shift, _| shift <= Q2_RANGE);
         let is_sound = has_converged.and(is_met).and(is_near);
         let is_sound = is_sound.and(in_range(x.l)).and(in_range(x.m));

@@ -96,19 +96,6 @@ impl End {
         let position = Vectors::of(|k| vertex(k).position);
         Self { position, normal: Vectors::of(|k| vertex(k).normal), shape }
     }
-
-    /// `t^T M t` of the second fundamental form `M`.
-    #[inline(always)]
-    fn curvature(&self, t: Vectors) -> Lanes {
-        let m = &self.shape;
-        let [x, y, z] = t.0;
-        let mt = Vectors([
-            m[0] * x + m[1] * y + m[2] * z,
-            m[1] * x + m[3] * y + m[4] * z,
-            m[2] * x + m[4] * y + m[5] * z,
-        ]);
-        t.dot(mt)
-    }
 }
 
 /// Control points of the quartics nearest to the targets; where there is no sound one any.
@@ -121,12 +108,12 @@ fn quartic(
     // symbols: q1 = l t0, q3 = q4 - m t1, k normal curvatures times the chord
     let [q0, q4] = [ends[0].position, ends[1].position];
     let chord = q4 - q0;
-    let length = norm(chord);
+    let length = chord.norm();
     let chord = chord.over(length);
     let normals = [ends[0].normal, ends[1].normal];
     let (t0, sound0) = tangent(normals[0], chord);
     let (t1, sound1) = tangent(normals[1], chord);
-    let k = [length * ends[0].curvature(t0), length * ends[1].curvature(t1)];
+    let k = [length * t0.form(&ends[0].shape), length * t1.form(&ends[1].shape)];
     let (fit, is_regular) = Fit::new(samples, &[t0, t1]);
     let mut along = *targets;
     for point in &mut along {
@@ -146,14 +133,9 @@ fn quartic(
 #[inline(always)]
 fn tangent(normal: Vectors, chord: Vectors) -> (Vectors, Mask) {
     let along = chord - normal.times(normal.dot(chord));
-    let size = norm(along);
+    let size = along.norm();
     let is_sound = size.is(Lanes::all(SHORTEST_TANGENT), |size, least| size <= least).not();
     (along.over(size), is_sound)
-}
-
-#[inline(always)]
-fn norm(v: Vectors) -> Lanes {
-    v.dot(v).map(f64::sqrt)
 }
 
 /// Right-hand side of the normal equations, targets relative to `q0` in chords.

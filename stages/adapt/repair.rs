@@ -297,9 +297,12 @@ fn mends(surface: &SurfaceMesh<'_>, gate: &Gate, faces: &[u32]) -> Vec<Option<Me
     .concat()
 }
 
-/// Whether all that the edit of a face depends on is as it was at a time: the faces about its
+/// Whether all that the edit of a face depends on is as it was at a time: itself, the faces about its
 /// corners and about the vertices opposite to its sides.
 fn is_as_at(surface: &SurfaceMesh<'_>, time: u32, face: u32) -> bool {
+    if !surface.mesh.is_face(face) {
+        return false;
+    }
     let opposite = |h: HalfEdge| surface.mesh.opposite(h).map(|o| surface.mesh.origin(o.prev()));
     let beside = halves(face).into_iter().filter_map(opposite);
     surface.mesh.face(face).into_iter().chain(beside).all(|v| surface.fan_is_as_at(time, v))
