@@ -20,7 +20,7 @@ use isospline_pipeline::{
 };
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Name of the canonical model file.
 pub const MODEL_NOTE: &str = "model.toml";
@@ -101,7 +101,7 @@ impl ModelFolder {
 
     /// Makes what is not fresh, after writing the canonical model file. A model with a tolerance
     /// is run for several numbers of faces, until its error is just below it; where patches
-    /// fold or lie beyond the tolerance the surface is made again with those faces split.
+    /// fold or lie beyond the tolerance the surface is made again with those faces edited.
     ///
     /// # Errors
     /// See [`RunError`]; what was finished is kept.
@@ -177,7 +177,7 @@ impl ModelFolder {
     /// # Errors
     /// [`FolderError::Store`], [`FolderError::Surface`].
     pub fn check(&self, threads: usize) -> Result<CheckReport, FolderError> {
-        let last = self.last_check.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let last = self.last_check().take();
         if let Some((content, report)) = last
             && content == self.patches()?.content()
         {
@@ -191,16 +191,18 @@ impl ModelFolder {
         limits: &CheckParams,
         threads: usize,
     ) -> Result<CheckReport, FolderError> {
-        self.measured(limits, threads, |_, checked| checked.report)
+        let (_, report) = self.measured(limits, threads, |_, checked| checked.report)?;
+        Ok(report)
     }
 
-    /// What `take` makes of the finished surface and what its check found.
+    /// The content of the finished patches, and what `take` makes of their surface and of what its
+    /// check found.
     fn measured<T>(
         &self,
         limits: &CheckParams,
         threads: usize,
         take: impl FnOnce(&Surface<'_>, Checked) -> T,
-    ) -> Result<T, FolderError> {
+    ) -> Result<(Key, T), FolderError> {
         let container = self.patches()?;
         let surface = Surface::from_patches(&container.view::<Patches>()?)?;
         let job = Job {
@@ -212,7 +214,12 @@ impl ModelFolder {
         };
         let threads = Threads::new(threads);
         let check = || check_faces(&job, &|n, body| threads.for_each(n, body));
-        Ok(take(&surface, threads.within(check)))
+        Ok((container.content(), take(&surface, threads.within(check))))
+    }
+
+    fn last_check(&self) -> MutexGuard<'_, Option<(Key, CheckReport)>> {
+        // The report of a thread that panicked is still one.
+        self.last_check.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Counters of every fallback that a stage took, as `stage.name`.

@@ -9,7 +9,6 @@ use isospline_artifact::StoreError;
 use isospline_pipeline::{Event, RunError, RunOptions, RunReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::sync::PoisonError;
 
 /// Name of the note of the unfit faces.
 pub const MENDS_NOTE: &str = "mends.json";
@@ -81,10 +80,8 @@ impl ModelFolder {
             (unfit(surface, &self.model.field, &checked, tolerance, method), checked.report)
         });
         match measured {
-            Ok((unfit, report)) => {
-                let content = self.patches()?.content();
-                *self.last_check.lock().unwrap_or_else(PoisonError::into_inner) =
-                    Some((content, report));
+            Ok((content, (unfit, report))) => {
+                *self.last_check() = Some((content, report));
                 Ok(unfit)
             }
             Err(FolderError::Store(error)) => Err(error.into()),
